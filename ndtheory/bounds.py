@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any, Literal
@@ -248,7 +248,9 @@ class Answer:
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``editions.<name>`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
-        values = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "edition"}
+        values = {
+            field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("edition", "why")
+        }
         plain = lambda value: list(value) if isinstance(value, tuple) else value
         numbers = {name: value.to_dict() for name, value in values.items() if isinstance(value, Number)}
         return {name: plain(value) for name, value in values.items()} | numbers | {"reason": self.reason}
@@ -278,6 +280,8 @@ class Bounds(Answer):
         Whether the proof behind this edition holds for these constants, all that are enclosed.
     threshold_on : {'k', 'C_K'}
         The constant to which C2 to C5 apply.
+    why : str
+        Why there is no interval.
     """
 
     edition: Edition
@@ -293,6 +297,7 @@ class Bounds(Answer):
     C6: Number | None
     proved: bool
     threshold_on: Literal["k", "C_K"]
+    why: str = "friction at or above C2"
 
     @property
     def reason(self) -> dict[str, str]:
@@ -303,8 +308,14 @@ class Bounds(Answer):
         if self.C6 is None:
             reasons["C6"] = "a' >= -1: no lower end but 0"
         if self.interval is None:
-            reasons["interval"] = "friction at or above C2"
+            reasons["interval"] = self.why
         return reasons
+
+    def without_conclusion(self, why: str) -> Bounds:
+        """The same constants, and no theta that contracts."""
+        verdict: Conclusion | None = None if self.theta is None else "no conclusion"
+        none = replace(self, interval=None, interval_proved=None, factor=None, one_minus_factor=None)
+        return replace(none, verdict=verdict, why=why)
 
 
 def evaluate(edition: Edition, constants: Constants, theta: Numeric | None = None) -> Bounds:

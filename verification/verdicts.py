@@ -9,6 +9,7 @@ from ndtheory.number import directed
 from verification.algorithm.rates import StepRatio
 from verification.algorithm.runs import Run
 from verification.bounds.bound import NOT_ASKED, BoundResult
+from verification.sections.numbers import near_one
 
 #: A bound may be attained: a ratio above it by less than this share of 1 - bound counts as equal.
 TIGHT = 1e-6
@@ -27,7 +28,9 @@ class Judgement:
     reason: str
 
 
-def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved: bool = False) -> Judgement:
+def judge(
+    bound: float | None, seen: StepRatio | None, why_none: str, *, proved: bool = False, rest: float | None = None
+) -> Judgement:
     """Compare a bound on the factor of one step with the largest factor seen.
 
     A bound may be attained: an excess below :data:`TIGHT` of ``1 - bound`` counts as equality.
@@ -40,6 +43,8 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved:
         None: no step is clear of rounding.
     proved : bool
         Whether the bound is the upper end of an enclosure; then it is called proved, and rounded upwards.
+    rest : float, optional
+        1 - bound, where it is known without cancellation; rounded down if proved.
 
     Examples
     --------
@@ -53,10 +58,13 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved:
     if seen.steps == 0:
         return Judgement(verdict="NOT_COMPUTED", reason="no step was taken")
     digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
-    shown = f"bound {bound:.{digits}g}"
+    rest, bound_up = 1 - bound if rest is None else rest, bound
     if proved:
-        shown = f"proved bound {directed(bound, digits, up=True):.{digits}g}"
-    says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, {shown}"
+        bound_up, rest = (
+            float(directed(x, n, up=up)) for x, n, up in ((bound, digits, True), (rest, digits - 2, False))
+        )
+    shown = f"{'proved ' * proved}bound {near_one(bound_up, digits, rest)}"
+    says = f"ratios <= {near_one(seen.value, digits)} in {seen.steps} steps, {shown}"
     if seen.hi <= bound:
         return Judgement(verdict="CONSISTENT", reason=says)
     slack = TIGHT * (1 - bound)
@@ -92,7 +100,8 @@ def judge_bound(result: BoundResult, seen: StepRatio | None, outside: str) -> Ju
         return Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
     if result.not_computed:
         return Judgement(verdict="NOT_COMPUTED", reason=result.not_computed)
-    factor = result.factor
+    factor, rest = result.factor, result.one_minus_factor
     if factor is not None and factor.hi is not None and result.proved:
-        return judge(factor.hi, seen, result.why, proved=True)
-    return judge(None if factor is None else factor.value, seen, result.why)
+        return judge(factor.hi, seen, result.why, proved=True, rest=None if rest is None else rest.lo)
+    least = None if rest is None else rest.value
+    return judge(None if factor is None else factor.value, seen, result.why, rest=least)

@@ -231,7 +231,7 @@ check(
     id="5.14",
     text="m d_1^2 <= a_1(d, d) <= M d_1 (C_R d_2) + F by (5.12), with (5.13) for F.",
     goals=lambda form: at_most(form, M * d1 * (C_R * d2 / (1 + p)) / (1 + q) + x * (d1 * d2 + d2**2) - r),
-    forms={"printed": (A + x) * d1 * d2 + x * d2**2},
+    forms={"repaired": (A + x) * d1 * d2 + x * d2**2},
     mutants={"without C_R": (M + x) * d1 * d2 + x * d2**2, "without C_K d_2^2": (A + x) * d1 * d2},
     states=lambda form: Relation(m * d1**2, "<=", form),
 )
@@ -242,7 +242,7 @@ check(
     goals=lambda form: equal(
         m * (d1 - form * d2) ** 2 - (m * form**2 + x) * d2**2, m * d1**2 - (A + x) * d1 * d2 - x * d2**2
     ),
-    forms={"printed": (A + x) / (2 * m)},
+    forms={"repaired": (A + x) / (2 * m)},
     mutants={"the factor 1/2 dropped": (A + x) / m, "1/m dropped": (A + x) / 2},
     states=lambda form: Relation(m * (d1 - form * d2) ** 2, "<=", ((A + x) ** 2 / (4 * m) + x) * d2**2),
 )
@@ -251,7 +251,7 @@ check(
     id="5.11",
     text="No d_1 above the bound satisfies (5.14): at d_1 = (bound + y) d_2, y > 0, its left side is the larger one.",
     goals=lambda form: less((A + x) * (form + y) + x, m * (form + y) ** 2, CONSTANTS),
-    forms={"printed": X},
+    forms={"repaired": X},
     mutants={
         "without the root": (A + x) / m,
         "1/m dropped under the root": (A + x) / m + sp.sqrt(x),
@@ -314,7 +314,7 @@ check(
     id="5.16",
     text="C_T is the product of the constants of (5.18), (5.11) and (5.19).",
     goals=lambda form: equal(form, A * X / m, CONSTANTS),
-    forms={"printed": of_16},
+    forms={"repaired": of_16},
     mutants={
         "C_R dropped": of_16 / C_R,
         "1/m for 1/m^2": of_16 * m,
@@ -327,7 +327,7 @@ check(
     id="prop-5.4",
     text="|T psi - T psi~| <= A d_1, d_1 <= X d_2, d_2 <= n/m: the Lipschitz constant C_T.",
     goals=lambda form: at_most(form, A * X / (1 + p) * (n / m) / (1 + q) / (1 + r)),
-    forms={"printed": of_16 * n},
+    forms={"repaired": of_16 * n},
     mutants={"m for M": bounds.lipschitz(m, m, C_R, x) * n},
     states=lambda form: Relation(tn, "<=", form),
 )
@@ -587,9 +587,9 @@ check(
 
 check(
     id="5.38",
-    text="(5.38) as printed, with m~ in front and C_T itself.",
+    text="(5.38) with m~ in front and C_T itself.",
     goals=lambda form: at_most(form, (A * X / m) ** 2 / m * M**2 / m / (1 + p), SMALL_M, LARGE_M),
-    forms={"printed": of_16**2 * M**2 / m_tilde**2},
+    forms={"repaired": of_16**2 * M**2 / m_tilde**2},
     mutants={"1/m~ for 1/m~^2": of_16**2 * M**2 / m_tilde / m / (1 + m)},
 )
 
@@ -597,7 +597,7 @@ check(
     id="5.38",
     text="t^2 <= t_n^2/m by (5.22), t_n <= C_T n, n^2 <= M^2 e^2/m by (5.23).",
     goals=lambda form: at_most(form, (A * X / m) ** 2 / m * M**2 / m / (1 + p)),
-    forms={"printed": bounds.Q(x, m, M, C_R)},
+    forms={"repaired": bounds.Q(x, m, M, C_R)},
     mutants={
         "M^2 dropped": bounds.Q(x, m, M, C_R) / M**2,
         "C_T for C_T^2": of_16 * M**2 / m**2,

@@ -2,6 +2,8 @@
 
 import html
 import math
+import re
+from fractions import Fraction
 
 import pytest
 
@@ -308,3 +310,25 @@ def test_a_title_is_text_in_a_notebook(write):
     shown = vf.run(vf.load(write({"title": '"<script>alert(1)</script> & more"'})))._repr_html_()
     assert "<script" not in shown
     assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; more" in shown
+
+
+# --- the calculator ---
+
+
+@pytest.mark.parametrize("m", ["1/10", "1"])
+def test_the_calculator_says_where_M_is_no_sum_and_the_theorem_as_printed_concludes_nothing_there(call, m):
+    """With M^1 = M^2 = m = 1/10 a step may multiply errors by 1.3 where it would promise less than 1."""
+    given = ["bounds", "--m", m, "--CR", "1", "--CK", "1e-4", "--theta", "1/5", "--M"]
+    less, enough = (call(*given, M, "--json").document["editions"] for M in (m, str(2 * Fraction(m))))
+    assert "M < 2 m: no two bodies have that" in call(*given, m).out
+    assert "M < 2 m" not in call(*given, str(2 * Fraction(m))).out
+    assert enough["printed"]["verdict"] == less["repaired"]["verdict"] == "contraction"
+    assert less["printed"]["verdict"] == ("no conclusion" if m == "1/10" else "contraction")
+    assert ("M >= 2 m" in less["printed"]["reason"].get("interval", "")) == (m == "1/10")
+    assert call(*given, m, "--check").status == 0  # by the repaired edition
+
+
+def test_the_examples_of_the_calculator_are_about_sums(call):
+    examples = re.findall(r"--m (\S+) --M (\S+)", call("bounds", "--help").out)
+    assert examples
+    assert all(Fraction(M) >= 2 * Fraction(m) for m, M in examples)

@@ -73,3 +73,13 @@ def test_the_numbers_that_the_readme_explains_are_those_of_section_6() -> None:
     assert f"below theta = {2 / (1 + upper.rho.value):.3f}, and {steps(upper.rate_predicted)} steps" in text
     assert f"2/2.475 = {lower.theta_predicted:.2f}" in text
     assert f"the same model has rho = {upper.rho.value:.1f}" in text
+
+
+def test_the_readme_has_a_formula_for_bodies_that_touch_and_one_for_tied_ones_and_what_each_takes() -> None:
+    from ndtheory.energy_norms import predicted_theta, tied_factor, tied_theta
+    from verification.advice.roles import steps
+
+    low, high = 2.78, 36.0
+    tied, touching = (steps(tied_factor(theta, low, high)) for theta in (tied_theta(low, high), predicted_theta(high)))
+    told = f"from {low} to {high} this takes {tied} steps to an error of 1e-9, and 2/(2 + rho) takes {touching}."
+    assert told in " ".join(README.split())

@@ -148,6 +148,11 @@ def test_the_glossary_lists_all_its_terms_in_alphabetical_order():
     assert listed == sorted(defined(text), key=str.lower)
 
 
+def test_the_glossary_defines_each_verdict_of_the_ledger_as_the_ledger_does():
+    entry = (DOCS / "glossary.md").read_text("utf-8").partition("\nverdict\n")[2].partition("\n\nno conclusion\n")[0]
+    assert dict(re.findall(r"^  - ([A-Z]+): (.*)\.$", entry, re.MULTILINE)) == WORDS
+
+
 @pytest.fixture(scope="module")
 def notebooks(builder):
     return builder.notebooks

@@ -313,20 +313,50 @@ def a_little_short(claim):
     claim["a"] = str(short) if isinstance(claim["a"], str) else [str(short), *claim["a"][1:]]
 
 
+def with_a_leaning_normal(discrete, claim, length=1):
+    """Both bodies list normals; the first of the contact body leans, or is longer than 1."""
+    for body in (discrete["body1"], discrete["body2"]):
+        body["normals"] = [["0", "1"] for _ in body["surface"]]
+    x, y = Fraction(3, 5) * length, Fraction(4, 5) * length
+    discrete[f"body{3 - discrete['neumann_body']}"]["normals"][0] = [str(x), str(y)]
+
+
+def with_a_leaning_normal_where_a_support_holds(discrete, claim):
+    """Along x, which is not its tangent; without friction the checker keeps the normal component only."""
+    with_a_leaning_normal(discrete, claim)
+    body = discrete[f"body{3 - discrete['neumann_body']}"]
+    body["held"].append([body["surface"][0], 0])
+    discrete["friction"] = "0"
+
+
+def negative(claim, name):
+    values = claim["multipliers"][name]
+    claim["multipliers"][name] = [str(-Fraction(values[0])), *values[1:]]
+
+
 BREAKS = {
-    "multipliers that are not negative": lambda d, c: c["multipliers"]["lambda"].__setitem__(0, "-1"),
+    **{
+        "multipliers that are not negative" + i * " ": lambda d, c, name=name: negative(c, name)
+        for i, name in enumerate(("lambda", "tau", "a", "b"))
+    },
     "4 a b": lambda d, c: c["multipliers"].update(a="0"),
     "4 a b ": lambda d, c: a_little_short(c["multipliers"]),
     "a rational": lambda d, c: d["weights"].__setitem__(0, 0.5),
     "a rational, ": lambda d, c: d["weights"].__setitem__(0, "0.5"),
     "0 < theta": lambda d, c: c.update(theta="2"),
     "-1 < nu < 1/2": lambda d, c: d["body1"].update(poisson="2/3"),
+    "-1 < nu < 1/2 ": lambda d, c: d["body1"].update(poisson="-3/2"),
     "E > 0": lambda d, c: d["body2"].update(young="-1"),
     "anticlockwise": lambda d, c: d["body1"]["cells"][0].reverse(),
     "contact nodes that are free": lambda d, c: d["body1"]["held"].append([d["body1"]["surface"][0], 1]),
     "each once": lambda d, c: d["body2"]["surface"].__setitem__(0, d["body2"]["surface"][1]),
     "node numbers": lambda d, c: d["body2"]["surface"].__setitem__(0, -1),
-    "positive weight": lambda d, c: d["weights"].__setitem__(0, "0"),
+    "trapezoid weights": lambda d, c: d["weights"].__setitem__(0, "0"),
+    "normals of length 1": lambda d, c: with_a_leaning_normal(d, c, length=2),
+    "normals of length 1 ": lambda d, c: with_a_leaning_normal(d, c, length=Fraction(1, 2)),
+    "no support of a contact node with its own normal": with_a_leaning_normal_where_a_support_holds,
+    "cells that do not overlap": lambda d, c: d["body1"]["cells"].append(d["body1"]["cells"][0]),
+    "hat of the radius claimed": lambda d, c: c.update(radius="1/4"),
     "a matrix of": lambda d, c: d["kernel"].pop(),
     "multipliers of each kind": lambda d, c: c["multipliers"]["lambda"].pop(),
     "neumann_body": lambda d, c: d.update(neumann_body=3),

@@ -1,5 +1,6 @@
 """Certificates put forward for small problems: none that is accepted is false, by enumeration in rationals."""
 
+import json
 from collections import Counter
 from fractions import Fraction
 from importlib import import_module
@@ -8,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from problem_list import blocks
+from mesh_writer import read_here, write_gmsh22
+from problem_list import blocks, changed
 from strategies import AT_NIGHT
 
 import verification as vf
+from fem1d2d import mesh_files, rectangle
 from verification.algorithm.affine_piece import Piece
 from verification.certificate import check
 from verification.contact.active_set import Pattern
@@ -90,3 +93,89 @@ def test_the_largest_piece_in_rationals_is_that_of_the_jacobians_in_doubles(benc
     beside = lambda share: str(Fraction(truth.largest) * (1 + Fraction(share)))
     assert truth.holds(beside("1e-9"))
     assert not truth.holds(beside("-1e-9"))
+
+
+# --- bodies and rules that are not those claimed ----------------------------------------------------------------------
+
+RUBBING = blocks(cells=[[1, 2], [2, 2]], contact={"friction": "1/20", "radius": "3/4"}, iteration={"theta": "0.3"})
+ONE_GRID = changed(RUBBING, body1={"cells": [2, 2]})
+
+
+def each_cell_four_times(body):
+    body["cells"] *= 4
+
+
+def four_copies_joined_at_every_other_contact_node(body):
+    """No edge occurs twice: the nodes of each copy are its own, but for some on Gamma_c."""
+    count, shared = len(body["points"]), set(body["surface"][::2])
+    points, cells, held = list(body["points"]), list(body["cells"]), list(body["held"])
+    for copy in (1, 2, 3):
+        of = lambda i, copy=copy: i if i in shared else i + copy * count
+        points += body["points"]
+        cells += [[of(i) for i in cell] for cell in body["cells"]]
+        held += [[of(i), component] for i, component in body["held"]]
+    body.update(points=points, cells=cells, held=held)
+
+
+def refused(document, **discrete):
+    """Why a certificate with other bodies is refused, though it names their hash; empty if it is not."""
+    document = {**document, "discrete": {**document["discrete"], **discrete}}
+    document["sha256"] = check.digest(document["discrete"])
+    return vf.check_again(document).why
+
+
+@pytest.mark.parametrize("several", [each_cell_four_times, four_copies_joined_at_every_other_contact_node])
+def test_a_body_whose_cells_lie_on_each_other_is_refused(several, benchmark, monkeypatch):
+    """It is as stiff as several: a certificate for such a body proves a factor that the body drawn does not have."""
+    stiff = vf.Problem.from_dict(changed(ONE_GRID, body1={"young": 2}, iteration={"neumann_body": 1}))
+    document = json.loads(vf.certify(stiff).to_json())
+    body = {**document["discrete"]["body1"], "young": "1/2"}
+    drawn = benchmark.Truth({**document["discrete"], "body1": dict(body)}, document["claim"]["theta"])
+    assert drawn.largest > 4 > 0.8 > float(Fraction(document["claim"]["factor"]))
+    several(body)
+    assert "cells that do not overlap" in refused(document, body1=body)
+    if several is each_cell_four_times:
+        monkeypatch.setattr(check, "apart", lambda cells: None)
+        assert not refused(document, body1=body)
+
+
+def test_weights_and_a_kernel_that_are_not_those_of_the_points_are_refused(monkeypatch):
+    """A quarter of either is a quarter of the friction."""
+    for data, neumann in ((ONE_GRID, 1), (RUBBING, 1), (RUBBING, 2)):
+        problem = vf.Problem.from_dict(changed(data, iteration={"neumann_body": neumann, "theta": "1/10"}))
+        document = json.loads(vf.certify(problem, edition="energy").to_json())
+        assert "hat kernel of radius 3/4" in vf.check_again(document, problem).words
+        quarter = lambda numbers: [str(Fraction(x) / 4) for x in numbers]
+        weights, kernel = (document["discrete"][name] for name in ("weights", "kernel"))
+        assert "trapezoid weights" in refused(document, weights=quarter(weights))
+        assert "trapezoid weights" in refused(document, weights=weights[:-1])
+        assert "hat of the radius claimed" in refused(document, kernel=[quarter(row) for row in kernel])
+        document["claim"]["radius"] = "1/2"
+        assert "hat of the radius claimed" in refused(document)
+        del document["claim"]["radius"]
+        assert refused(document, kernel=[quarter(row) for row in kernel]) == ""
+        assert "trapezoid weights" in refused(document, weights=quarter(weights))
+        assert "kernel that it lists" in vf.check_again(document).words
+
+
+def test_a_body_with_a_hole_has_a_certificate(tmp_path, monkeypatch):
+    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+    whole = rectangle((0.0, 3.0), (-3.0, 0.0), (3, 3))
+    inside = np.all(np.abs(whole.points[whole.cells].mean(axis=1) - (1.5, -1.5)) < 0.5, axis=1)
+    sides = {name: whole.sides[name] for name in ("bottom", "top")}
+    write_gmsh22(tmp_path / "ring.msh", whole.points, whole.cells[~inside], sides)
+    ring = {"mesh": str(tmp_path / "ring.msh"), "young": 3, "poisson": "0.3", "fixed": ["bottom"]}
+    problem = vf.Problem.from_dict(
+        {
+            **blocks(
+                width=3,
+                cells=[[1, 1], [3, 1]],
+                iteration={"neumann_body": 1},
+                contact={"friction": "1/100", "radius": 1},
+            ),
+            "body1": ring,
+        }
+    )
+    found = vf.certify(problem, theta="1/10", edition="energy")
+    assert len(found.discrete["body1"]["cells"]) == 16
+    assert vf.check_again(found.to_dict(), problem).accepted

@@ -6,15 +6,18 @@ from fractions import Fraction
 import pytest
 from ledger_evidence import HOLDS, PRINTED, REPAIRED, STEP, holds
 
+from ndtheory.statements import statements
 from verification.interface.pair import pair_from
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
 from verification.ledger.evidence import settle
 from verification.ledger.experiments import Section6, StoppedRuns
+from verification.ledger.sheets import outcome
 from verification.ledger.solutions import solutions
 from verification.monolithic import solution_force, solve
+from verification.problem import Problem
 from verification.reproduce import READINGS
-from verification.reproduce.claims import NODES, zones
+from verification.reproduce.claims import NODES, zones, zones_hold
 from verification.sweeps.sweep import sweep
 
 EXPECTED = {
@@ -275,6 +278,17 @@ def test_figure_5_is_that_of_half_models_among_them_one_pressed_on_the_left_two_
     assert list(ends) == ["stick", "slip", "open"]
     assert ends["stick"] == pytest.approx(0.6, abs=0.075)
     assert ends["slip"] == pytest.approx(1.0, abs=0.075)
+    data = shown[0].problem(190).to_dict()
+    local = Problem.from_dict({**data, "contact": {**data["contact"], "law": "local"}})
+    assert zones_hold(solve(local).contact), "as the note of the statement says"
+    assert statements()["fig-5"].note.endswith("with the local law a reading that shows the figure shows it, too.")
+
+
+def test_evidence_from_readings_that_all_depart_from_the_text_is_told_so(seen):
+    for id, departs in (("fig-5", True), ("fig-12", False)):
+        (evidence,) = seen[id]
+        assert evidence.data["departs"] is departs
+        assert ("holds only in readings that depart from the text" in outcome(evidence)) is departs
 
 
 def test_a_figure_that_no_reading_shows_is_told_with_the_zones_of_the_nearest():

@@ -14,10 +14,12 @@ from ndtheory import Number
 from verification.algorithm.linearisation import NotLinear, forecast
 from verification.algorithm.rates import StepRatio
 from verification.bounds import LARGEST
+from verification.bounds.bound import Subject
 from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
 from verification.comparison import compare
+from verification.interface.files import read_interface, write_interface
 from verification.verdicts import TIGHT, judge, judge_forecast
 
 BOUND = 0.5
@@ -55,6 +57,42 @@ def test_the_slack_of_a_bound_near_1_is_a_share_of_what_it_leaves():
     bound = 1 - 1e-9
     assert judge(bound, ratio(1 - 0.6e-9, 1 - 0.5e-9), "").verdict == "VIOLATED"
     assert judge(bound, ratio(1 - 2e-9, 1 - 1.1e-9), "").verdict == "CONSISTENT"
+
+
+@pytest.mark.parametrize(
+    ("bound", "rest", "proved", "said"),
+    [
+        (1 - 1e-9, None, False, "ratios <= 1 - 1.5e-09 in 7 steps, bound 1 - 1e-09"),
+        (1.0, 2.49e-21, False, "ratios <= 1 - 1.5e-09 in 7 steps, bound 1 - 2.5e-21"),
+        (1.0, 2.49e-21, True, "ratios <= 1 - 1.5e-09 in 7 steps, proved bound 1 - 2.4e-21"),
+    ],
+)
+def test_ratios_and_a_bound_near_1_are_told_apart_by_their_distances_from_1(bound, rest, proved, said):
+    assert judge(bound, ratio(1 - 2e-9, 1 - 1e-9), "", proved=proved, rest=rest).reason == said
+
+
+def test_the_reason_of_a_verdict_has_the_distance_of_a_printed_factor_from_1():
+    problem = vf.Problem.from_dict(blocks(contact={"friction": 0}, iteration={"theta": "1e-12", "max_iterations": 3}))
+    assert "bound 1 - 1e-12" in vf.compare(problem, bounds=["repaired"]).verdicts["repaired"].reason
+
+
+def printed(friction, theta):
+    """The theorem as printed for two steel blocks, their moduli in Pa, both read from a file and from its matrices."""
+    steel = {"young": "21e10"}
+    contact = {"radius": "1/2", "friction": friction}
+    pair = vf.build(vf.Problem.from_dict(blocks(body1=steel, body2=steel, contact=contact)))
+    return pair, BOUNDS["printed"].evaluate(Subject.of(pair, vf.measure(pair)), theta)
+
+
+def test_a_problem_takes_the_friction_that_the_theorem_as_printed_allows_in_pascal(tmp_path):
+    allowed = printed("1/10", "1e-25")[1].friction.some.value
+    assert allowed < 1e-40
+    pair, found = printed(str(allowed / 2), "1e-25")
+    assert found.factor is not None
+    write_interface(pair, tmp_path / "interface.npz")
+    assert float(read_interface(tmp_path / "interface.npz").friction) == allowed / 2
+    with pytest.raises(vf.ProblemError, match="of a size between 1e-70 and 1e"):
+        printed("1e-71", "1e-25")
 
 
 def test_what_was_not_computed_is_not_called_consistent():

@@ -30,6 +30,9 @@ TRACED = 12
 #: The constants that may be given to the calculator, for Section 5 and for the theorem in energy norms.
 SECTION_5, ENERGY = ("m", "M", "C_R", "C_s", "C_tr", "k", "C_K"), ("rho", "kappa_1", "kappa_2")
 
+#: Why an edition that its own proof does not cover has no interval: Proposition 5.6 as printed needs the sum.
+NO_SUM = "needed M >= 2 m, as M is the sum of the constants of both bodies (4.2)"
+
 
 class Section5(Bound):
     """An edition of Proposition 5.6."""
@@ -39,11 +42,13 @@ class Section5(Bound):
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if subject.constants is None:
             return self.absent(subject.why)
-        found = evaluate(self.edition, subject.constants, theta)
-        why = ""
-        if theta is not None and found.factor is None:
-            friction = float(subject.constants.C_K if subject.constants.k is None else subject.constants.k)
-            why = _why_not(found.interval, found.C2, friction, found.theta, subject.varies)
+        found, why = evaluate(self.edition, subject.constants, theta), ""
+        friction = Thresholds(every=found.C4, some=found.C2, on="any" if found.C2 is None else found.threshold_on)
+        if not found.proved and 2 * subject.constants.m > subject.constants.M:
+            found, why, friction = found.without_conclusion(NO_SUM), NO_SUM, Thresholds(on=found.threshold_on)
+        elif theta is not None and found.factor is None:
+            given = float(subject.constants.C_K if subject.constants.k is None else subject.constants.k)
+            why = _why_not(found.interval, found.C2, given, found.theta, subject.varies)
             if self.of_unit and subject.measured is not None:
                 why += f" (in {subject.measured.units['stress']})"
         return BoundResult(
@@ -54,7 +59,7 @@ class Section5(Bound):
             one_minus_factor=found.one_minus_factor,
             interval=found.interval_proved or found.interval,
             interval_level=weakest([subject.constants.level, "verified"]) if found.interval_proved else "float",
-            friction=Thresholds(every=found.C4, some=found.C2, on="any" if found.C2 is None else found.threshold_on),
+            friction=friction,
             why=why,
             detail=found,
         )

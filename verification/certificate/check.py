@@ -19,12 +19,15 @@ T_theta is piecewise affine, and a constant of all its pieces is one.  On a piec
 p_N = 0 (-1), and a sign e (signs, 1 or -1) with ``(p_T - e w k zeta) v_T = 0``; the first factor is 0 (slip, 1) or the
 other one (-1).  A tree divides the pieces by such cases.  Each of its leaves has multipliers, and for each case on the
 way to it one more, of any sign, for a form that vanishes there: a square, or the product.
+
+Whether bodies, normals, transfer and a kernel without a radius belong to a certain problem is not decided here.
 """
 
 import hashlib
 import json
 import re
 import sys
+from itertools import accumulate, pairwise
 
 from flint import arb, arb_mat, ctx, fmpq
 
@@ -58,14 +61,14 @@ def check(discrete, claim, eliminated=None):
     ctx.prec = min(int(claim["bits"]), 20000)
     theta, factor, k = map(rational, (claim["theta"], claim["factor"], discrete["friction"]))
     demand(0 < theta <= 1 and factor >= 0 and k >= 0, "0 < theta <= 1, a factor and a friction that are not negative")
-    demand(discrete["neumann_body"] in (1, 2), "neumann_body 1 or 2")
-    neumann, contact = (discrete[f"body{i}"] for i in ((2, 1) if discrete["neumann_body"] == 2 else (1, 2)))
+    neumann, contact = roles(discrete)
     S_n, S_c = stiffness(neumann, both=True), stiffness(contact, both=k != 0)
     n, m, t = len(contact["surface"]), len(neumann["surface"]), len(contact["surface"]) if k else 0
     P = matrix(discrete["transfer"], n, m) if discrete["transfer"] else identity(n)
     demand(P.ncols() == m, "a transfer between contact nodes that differ")
     weights = [rational(w) for w in discrete["weights"]]
-    demand(len(weights) == n and all(w > 0 for w in weights), "a positive weight for each contact node")
+    grids(discrete)
+    demand("radius" not in claim or hat(discrete, claim["radius"]), "a kernel that is the hat of the radius claimed")
     # rows: forms in (d, c).  Without friction p_T = 0, and c is only the normal trace
     at = lambda body, which: [(j, both[q]) for q in which for j, both in enumerate(axes(body))]
     onto = at(contact, (0, 1) if k else (1,))
@@ -140,6 +143,7 @@ def surface_stiffness(body, both):
                             shear = dot(g, w) * dot(h, u) + dot(g, h) * dot(u, w)
                             value, row = first * dot(g, u) * dot(h, w) + second * shear, rows.setdefault((i, p), {})
                             row[j, q] = row.get((j, q), 0) + value / (2 * twice)
+    apart([[points[i] for i in cell] for cell in body["cells"]])
     keep = [(node, p) for p in ((0, 1) if both else (1,)) for node in body["surface"]]
     demand(len(set(keep)) == len(keep) and not held & set(keep), "contact nodes that are free, each once")
     kept, done = set(keep), []
@@ -163,6 +167,57 @@ def surface_stiffness(body, both):
             lessen(rows, reached, reached, coupling.transpose() * solved)
             done = []
     return gathered(rows, keep, keep)
+
+
+def apart(cells):
+    """Demand that no two cells overlap: of two triangles that do not, one has a side with the other beyond it."""
+    turn = lambda a, b, c: (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+    beyond = lambda one, other: any(all(turn(one[i - 1], one[i], at) <= 0 for at in other) for i in range(3))
+    spans = ([(min(x), max(x)) for x in zip(*cell, strict=True)] for cell in cells)
+    near = []
+    for ((left, right), (low, high)), cell in sorted(zip(spans, cells, strict=True)):
+        near = [other for other in near if other[0] > left]
+        for _, bottom, top, other in near:
+            clear = bottom >= high or top <= low or beyond(cell, other) or beyond(other, cell)
+            demand(clear, "cells that do not overlap, each listed once")
+        near.append((right, low, high, cell))
+
+
+def roles(discrete):
+    """The Neumann body and the contact body."""
+    demand(discrete["neumann_body"] in (1, 2), "neumann_body 1 or 2")
+    return [discrete[f"body{i}"] for i in ((2, 1) if discrete["neumann_body"] == 2 else (1, 2))]
+
+
+#: Positions in doubles, or along a line with corners, are rounded: a rule for the weights and the kernel is met so far.
+close = lambda one, other, size: abs(one - other) < size / 10**6
+
+
+def grids(discrete):
+    """Positions of the contact nodes and of the Neumann nodes, along x or along both lines, as the weights have it."""
+    neumann, contact = map(positions, roles(discrete))
+    weights = [rational(w) for w in discrete["weights"]]
+    for own, other in zip(contact, neumann, strict=True):
+        widths = [b - a for a, b in pairwise(own)]
+        halves = [(a + b) / 2 for a, b in zip([0, *widths], [*widths, 0], strict=True)]
+        if len(halves) == len(weights) and all(close(w, h, h) for w, h in zip(weights, halves, strict=True)):
+            return own, (other if discrete["transfer"] else own)
+    raise Refused("needed the trapezoid weights of the contact nodes")
+
+
+def positions(body):
+    """Abscissas of the contact nodes, and distances along their line."""
+    nodes = [[arb(rational(x)) for x in body["points"][i]] for i in body["surface"]]
+    lengths = (((a - x) ** 2 + (b - y) ** 2).sqrt() for (a, b), (x, y) in pairwise(nodes))
+    return [x for x, _ in nodes], [*accumulate(lengths, initial=arb(0))]
+
+
+def hat(discrete, radius):
+    """True if the kernel is the hat of a radius on the grids."""
+    r, (own, other) = arb(rational(radius)), grids(discrete)
+    wanted = [[arb(0).max(1 - abs(x - y) / r) / r for y in other] for x in own]
+    listed = matrix(discrete["kernel"], len(own), len(other)).tolist()
+    return all(close(a, b, 1 / r) for rows in zip(listed, wanted, strict=True) for a, b in zip(*rows, strict=True))
 
 
 def axes(body):
@@ -225,7 +280,10 @@ def words(document):
         f"{name}: {len(body['points'])} nodes, {len(body['cells'])} triangles, E {body['young']}, nu {body['poisson']}"
         for name, body in ((name, discrete[name]) for name in ("body1", "body2"))
     ]
-    at = f"Neumann problem: body {discrete['neumann_body']}, k {discrete['friction']}, theta {claim['theta']}"
+    kernel = f"k {discrete['friction']} with the "
+    kernel += f"hat kernel of radius {claim['radius']}" if "radius" in claim else "kernel that it lists"
+    friction = kernel if rational(discrete["friction"]) else "no friction"
+    at = f"Neumann problem: body {discrete['neumann_body']}, {friction}, theta {claim['theta']}"
     spare = 1 - rational(claim["factor"])
     return "; ".join([*bodies, at, f"Lipschitz constant at most 1 - {float(arb(spare).mid()):.10g}"])
 

@@ -186,6 +186,9 @@ def certify(
     claim = Claims(discrete, progress).confirmed(chosen, spare, multipliers)
     if claim is None:
         raise NoCertificate(f"{BOUNDS[edition].words} {NOT_CONFIRMED.format(spare)}")
+    radius = problem.contact.radius
+    if pair.friction and radius is not None and check.hat(discrete, str(radius)):
+        claim["radius"] = str(radius)
     return Certificate(edition=edition, discrete=discrete, claim=claim, problem=problem, lower=lower)
 
 

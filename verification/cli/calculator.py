@@ -21,7 +21,7 @@ OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
 
 @click.command()
 @click.option("--m", "m", metavar="NUMBER", help="Smaller coercivity m^a of the bodies (stress).")
-@click.option("--M", "M", metavar="NUMBER", help="Sum of the continuity constants M^a (stress), at least m.")
+@click.option("--M", "M", metavar="NUMBER", help="Sum of the continuity constants M^a (stress), so at least 2 m.")
 @click.option("--CR", "C_R", metavar="NUMBER", help="Lift constant, at least 1.")
 @click.option("--Cs", "C_s", metavar="NUMBER", help="Constant of w -> S(sigma_N(w)) into L2.")
 @click.option("--Ctr", "C_tr", metavar="NUMBER", help="Constant of the tangential trace into L2.")
@@ -63,7 +63,7 @@ def bounds(
     \b
     Examples, m and M in MPa:
       ndtheory bounds --m 3084 --M 153229 --CR 1.70 --CK 1e-8 --theta 1e-4
-      ndtheory bounds --m 1 --M 1 --CR 1 --CK 0.1 -o h.svg
+      ndtheory bounds --m 1 --M 2 --CR 1 --CK 0.05 -o h.svg
       ndtheory bounds --rho 0.475 --kappa1 0.986 --kappa2 0.427 --theta 0.7
     """
     of_section_5 = {key: given[key] for key in SECTION_5}

@@ -26,7 +26,8 @@ from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix,
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.reading import at_least_one, factor, tolerance
-from verification.problem.tables import TomlTable, choice, label, non_negative, unreadable
+from verification.problem.specs import LEAST_FRICTION
+from verification.problem.tables import TomlTable, choice, label, number, unreadable
 
 #: Largest size of an interface file, and of what it unpacks to: two matrices of 4000 rows, and what else there is.
 MOST_BYTES = 600_000_000
@@ -193,7 +194,8 @@ def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     pair = ContactPair(
         contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body, settings=settings
     )
-    return pair.at(friction=texts.take("friction", non_negative))
+    coefficient = number("a number >= 0", lambda v: v >= 0, LEAST_FRICTION)
+    return pair.at(friction=texts.take("friction", coefficient))
 
 
 def _line(arrays: dict[str, np.ndarray], name: str, n: int) -> dict[str, Any]:

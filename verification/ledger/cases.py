@@ -88,6 +88,16 @@ def _clamped_plate(thickness: str) -> Mapping[str, Any]:
     }
 
 
+def _between_rollers(thickness: str) -> Mapping[str, Any]:
+    """Two thin layers that are held at one end and may slide along rollers, so that neither can bend."""
+    held = lambda side: {side: ["free", 0], "left": [0, 0]}
+    return {
+        "body1": rectangle([0, 2], [f"-{thickness}", 0], [4, 1], 1, 0, prescribed=held("bottom")),
+        "body2": rectangle([0, 2], [0, thickness], [4, 1], 1, 0, prescribed=held("top")),
+        "contact": {"interval": ["0.5", 2], "friction": 100, "radius": "0.5", "gap": 1},
+    }
+
+
 #: Problems on which a bound is false as printed, as the problem file reads them.  Loads do not matter: every pair of
 #: forces in one piece of T occurs for suitable loads.
 NAMED: Mapping[str, Mapping[str, Any]] = {
@@ -98,6 +108,13 @@ NAMED: Mapping[str, Mapping[str, Any]] = {
         "body2": rectangle([0, 1], [0, "0.0001"], [2, 1], 1, 0, prescribed={"top": [-1, 0]}),
         "contact": {"friction": 1, "radius": "0.5", "gap": 1},
     },
+}
+
+#: The problems that are decided with enclosures: on the last one doubles do not even tell equal sides.
+ENCLOSED: Mapping[str, Mapping[str, Any]] = {
+    **NAMED,
+    # much friction: C_tr into L2 is 78, into H^1/2 it is 1
+    "layers of a ten-thousandth between rollers": _between_rollers("0.0001"),
 }
 
 

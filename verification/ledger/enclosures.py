@@ -33,7 +33,7 @@ from ndtheory.intervals import Interval
 from ndtheory.number import SLACK, decimal, directed, working_precision
 from verification.constants.proved import Between, Proof, entries
 from verification.interface.body import Condensed, material_of
-from verification.ledger.cases import NAMED, three_digits
+from verification.ledger.cases import ENCLOSED, three_digits
 from verification.ledger.differences import directions, uniform_piece
 from verification.ledger.evidence import Evidence, Form, source
 from verification.ledger.inequalities import ENTRIES, SEED, RightSides, terms_of
@@ -46,13 +46,13 @@ MUCH = Fraction(10**8)
 
 
 class EnclosedBodies:
-    """The bodies of a problem of NAMED whose grids are one, with what is proved of them.
+    """The bodies of a problem of ENCLOSED whose grids are one, with what is proved of them.
 
     "1" is the contact body and "2" the Neumann body.
     """
 
     def __init__(self, name: str) -> None:
-        self.name, self.problem = name, Problem.from_dict(NAMED[name])
+        self.name, self.problem = name, Problem.from_dict(ENCLOSED[name])
         self.case = Trial.of(name, self.problem)
         self.proof = Proof(self.case.measured, self.case.pair, silent)
         self.measured = self.proof.result()
@@ -278,6 +278,9 @@ def _inverse_form(form: Between, x: Enclosed, inverse: float | None) -> tuple[In
 #: The bodies on which most is decided, and those on which (5.30) as printed fails, in a unit of stress.
 PLATE, LAYER = "plate of thickness 0.01 clamped at one end", "layer of a ten-thousandth on a block"
 
+#: The bodies on which what rests on (5.13) alone fails as printed, with C_tr into H^1/2.
+ROLLERS = "layers of a ten-thousandth between rollers"
+
 #: Units of stress in units of the file: the one in which (5.30) as printed fails, and the file's.
 SMALL, OWN = Fraction(1, 10**6), Fraction(1)
 
@@ -309,12 +312,15 @@ class EnclosedConstants(RightSides):
         The unit of stress in units of the file.
     share : Fraction
         The friction over the friction of the bodies.
+    half : bool
+        True if C_K has C_tr into H^1/2.
     """
 
     bodies: EnclosedBodies
     printed: bool = False
     unit: Fraction = OWN
     share: Fraction = Fraction(1)
+    half: bool = False
 
     @property
     def m(self) -> Interval:
@@ -326,7 +332,7 @@ class EnclosedConstants(RightSides):
 
     @property
     def C_K(self) -> Interval:
-        return self.bodies.number("C_K") * self.unit * self.share
+        return self.C_K_half if self.half else self.bodies.number("C_K") * self.unit * self.share
 
     @property
     def C_R(self) -> Interval:
@@ -436,11 +442,14 @@ OF_BODIES: tuple[Key, ...] = tuple(key for key, each in ENTRIES.items() if each.
 #: The statements that follow from (5.30), for theta at or close to C_0, where they say most.
 STEPS = ("5.31", "5.32", "5.33", "5.36", "5.39", "5.44")
 
+#: The statements that follow from (5.13) without (5.30).
+BY_TRACES = ("5.11", "5.14", "5.15", "prop-5.4", "5.38")
+
 #: For a pair of forces where all nodes are open and slip one way.
 OF_PAIRS: tuple[Key, ...] = (
-    *((id, "printed") for id in ("5.11", "5.13", "5.14", "5.15", "prop-5.4", "5.18", "5.19", "5.22", "5.23")),
+    *((id, "printed") for id in ("5.13", *BY_TRACES, "5.18", "5.19", "5.22", "5.23")),
     *((id, "printed") for id in ("x-root-M", "5.29", "5.30", "x-reaction", "x-friction-energy")),
-    *((id, "repaired") for id in ("5.13", "5.30", *STEPS)),
+    *((id, "repaired") for id in ("5.11", "5.13", "5.14", "5.15", "prop-5.4", "5.30", *STEPS)),
 )
 
 #: For such a pair at much friction, in a small unit of stress.
@@ -456,13 +465,20 @@ CONTRACTION: Mapping[Key, Fraction] = {
 }
 
 #: For a pair of forces where all nodes stick.
-OF_STICKING: tuple[Key, ...] = (("5.38", "printed"), ("x-ratio", "printed"), ("x-energy", "printed"), *CONTRACTION)
+OF_STICKING: tuple[Key, ...] = (("5.38", "repaired"), ("x-ratio", "printed"), ("x-energy", "printed"), *CONTRACTION)
 
 #: All of them, in the order in which they are decided.
 DECIDED: tuple[Key, ...] = (*OF_BODIES, *OF_PAIRS, *OF_MUCH, *OF_STICKING)
 
 #: On the layer: what fails as printed, and where the interval of Proposition 5.6 is the widest.
 ON_LAYER = {("4.7", "printed"), ("5.30", "printed"), *OF_MUCH, *CONTRACTION}
+
+
+def place(key: Key) -> str:
+    """The name of the bodies on which it is decided."""
+    if key[1] == "printed" and key[0] in BY_TRACES:
+        return ROLLERS
+    return LAYER if key in ON_LAYER else PLATE
 
 
 def both_sides(d: Any, r: Any, key: Key) -> Sides:
@@ -496,7 +512,8 @@ def decide(bodies: EnclosedBodies, id: str, of: Form) -> Evidence | None:
     share = MUCH if key in OF_MUCH else Fraction(1)
     where = bodies.name
     try:
-        reading = EnclosedConstants(bodies=bodies, printed=of == "printed", unit=unit, share=share)
+        half = place(key) == ROLLERS
+        reading = EnclosedConstants(bodies=bodies, printed=of == "printed", unit=unit, share=share, half=half)
         subject: Any = bodies
         if key in OF_STICKING:
             subject, where = bodies.sticks, f"{where}, all nodes sticking"
@@ -522,7 +539,7 @@ def decide(bodies: EnclosedBodies, id: str, of: Form) -> Evidence | None:
     in_unit = "" if unit == OWN else f", unit {float(unit):g}"
     data: dict[str, Any] = {
         "where": where,
-        "problem": {name: dict(table) for name, table in NAMED[bodies.name].items()},
+        "problem": {name: dict(table) for name, table in ENCLOSED[bodies.name].items()},
         "ratio": [at_least(6), at_most(6)],
         **({} if unit == OWN else {"unit": float(unit)}),
         **({} if share == 1 else {"friction": float(share)}),
@@ -533,7 +550,7 @@ def decide(bodies: EnclosedBodies, id: str, of: Form) -> Evidence | None:
 
 def _decided(id: str, known: Callable[[str], EnclosedBodies]) -> list[Evidence]:
     """The evidence of all forms of a statement."""
-    found = [decide(known(LAYER if key in ON_LAYER else PLATE), *key) for key in DECIDED if key[0] == id]
+    found = [decide(known(place(key)), *key) for key in DECIDED if key[0] == id]
     return [evidence for evidence in found if evidence is not None]
 
 

@@ -107,7 +107,12 @@ def in_readings(claim: Claim, result: Result) -> Evidence:
         text = f"in none of {tried}; {_nearest(claim, result.closest)}"
     data = {"criterion": claim.criterion, "outcome": verdict, "readings": [_data(outcome) for outcome in outcomes]}
     text = f"{claim.says} (criterion: {claim.criterion}): {text}"
-    return _evidence(True if shown else None, text, **data)
+    return _evidence(True if shown else None, text, departs=_departs(shown), **data)
+
+
+def _departs(shown: Sequence[ModelReading]) -> bool:
+    """True if some readings show a claim, and each of them departs from the text."""
+    return bool(shown) and all(reading.departs for reading in shown)
 
 
 def _nearest(claim: Claim, outcome: Outcome) -> str:
@@ -153,10 +158,11 @@ def _together(section: Section6) -> list[Evidence]:
     """Section 7: a report of the runs of Figures 10, 11 and 12, which a reading shows if it shows all three."""
     results = [section.result(CLAIMS[name]) for name in ("fig10", "fig11", "fig12")]
     held = [[outcome.holds for outcome in outcomes] for outcomes in zip(*(r.outcomes for r in results), strict=True)]
-    shown = [reading.name for reading, holds in zip(section.readings, held, strict=True) if all(holds)]
+    shown = [reading for reading, holds in zip(section.readings, held, strict=True) if all(holds)]
+    names = [reading.name for reading in shown]
     each = ", ".join(f"{result.figure} is {result.verdict}" for result in results)
     text = f"{each}; all three are shown by {len(shown)} of the {len(held)} readings tried"
-    return [_evidence(True if shown else None, text, readings=shown)]
+    return [_evidence(True if shown else None, text, readings=names, departs=_departs(shown))]
 
 
 # What is claimed of any bodies, by the paper (6.2) or by us.

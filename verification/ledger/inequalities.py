@@ -1,9 +1,9 @@
 """The inequalities of Sections 4 and 5, each with both of its sides; :mod:`verification.ledger.worst` searches.
 
 Both sides are functions of a :class:`Difference` and of the constants as an edition reads them; formulas come from
-:mod:`ndtheory.bounds`.  C_tr is the constant into L2(Gamma_c), but in (5.13) ``of="printed"``, which takes (5.8) at its
-word.  ``of="printed"`` reads m as m itself up to (5.33), as ``min(m, 1)`` from (5.36) on, and adds a stress to 1 in the
-bracket of (5.30): there the right side depends on the unit of stress, so several are tried.
+:mod:`ndtheory.bounds`.  C_tr is the constant into L2(Gamma_c); ``of="printed"`` takes (5.8) at its word in (5.13) and
+in what follows from it without (5.30).  It reads m as m itself up to (5.33), as ``min(m, 1)`` from (5.36) on, and adds
+a stress to 1 in the bracket of (5.30): there the right side depends on the unit of stress, so several are tried.
 """
 
 from __future__ import annotations
@@ -127,6 +127,11 @@ class Reading(RightSides):
         """All stresses times a factor, before an edition is chosen."""
         scaled = {name: getattr(self, name) * unit for name in ("m", "M", "C_K", "u", "coercivity", "C_K_half")}
         return replace(self, **scaled)
+
+    @property
+    def by_half(self) -> Reading:
+        """With C_tr into H^1/2, as (5.8) has it."""
+        return replace(self, C_K=self.C_K_half)
 
     @property
     def bracket(self) -> Reading:
@@ -289,6 +294,19 @@ def _editions(id: str, left: Side, right: Side, *, early: bool = False, **option
     return [printed, Inequality(id=id, of="repaired", left=left, right=right, **options)]
 
 
+def _by_traces(
+    id: str,
+    left: Side,
+    right: Side,
+    reading: Callable[[Reading], Reading] = lambda r: r.by_half,
+    units: tuple[float, ...] = (1.0,),
+    **options: Any,
+) -> list[Inequality]:
+    """An inequality that rests on (5.13): with C_tr into H^1/2 as printed, and into L2(Gamma_c)."""
+    printed = Inequality(id=id, of="printed", left=left, right=right, reading=reading, units=units, **options)
+    return [printed, Inequality(id=id, of="repaired", left=left, right=right, **options)]
+
+
 def _root(x: Any) -> Any:
     """The square root of an interval, or of numbers, where a negative one is rounding."""
     return x.sqrt() if isinstance(x, Interval) else np.sqrt(np.maximum(x, 0.0))
@@ -347,7 +365,7 @@ INEQUALITIES: tuple[Inequality, ...] = (
     Inequality(id="x-continuity", about="bodies", left=lambda b, r, _: b.largest, right=lambda b, r, _: b.continuity),
     Inequality(id="x-lift-bound", about="bodies", left=_lifts, right=lambda b, r, _: b.contrast),
     # --- Section 5: two forces
-    Inequality(id="5.11", left=lambda d, r, _: d.size_1, right=lambda d, r, _: r.X * d.size_2),
+    *_by_traces("5.11", lambda d, r, _: d.size_1, lambda d, r, _: r.X * d.size_2),
     Inequality(id="5.12", left=lambda d, r, _: d.energy_1, right=lambda d, r, _: (d.mixed_1, d.friction)),
     Inequality(
         id="5.13",
@@ -360,17 +378,17 @@ INEQUALITIES: tuple[Inequality, ...] = (
         left=lambda d, r, _: d.friction,
         right=lambda d, r, _: r.C_K * (d.size_1 * d.size_2 + d.size_2**2),
     ),
-    Inequality(
-        id="5.14",
-        left=lambda d, r, _: r.m * d.size_1**2,
-        right=lambda d, r, _: (r.A + r.C_K) * d.size_1 * d.size_2 + r.C_K * d.size_2**2,
+    *_by_traces(
+        "5.14",
+        lambda d, r, _: r.m * d.size_1**2,
+        lambda d, r, _: (r.A + r.C_K) * d.size_1 * d.size_2 + r.C_K * d.size_2**2,
     ),
-    Inequality(
-        id="5.15",
-        left=lambda d, r, _: r.m * (d.size_1 - (r.A + r.C_K) / (2 * r.m) * d.size_2) ** 2,
-        right=lambda d, r, _: ((r.A + r.C_K) ** 2 / (4 * r.m) + r.C_K) * d.size_2**2,
+    *_by_traces(
+        "5.15",
+        lambda d, r, _: r.m * (d.size_1 - (r.A + r.C_K) / (2 * r.m) * d.size_2) ** 2,
+        lambda d, r, _: ((r.A + r.C_K) ** 2 / (4 * r.m) + r.C_K) * d.size_2**2,
     ),
-    Inequality(id="prop-5.4", left=lambda d, r, _: d.dual_T, right=lambda d, r, _: r.C_T * d.dual),
+    *_by_traces("prop-5.4", lambda d, r, _: d.dual_T, lambda d, r, _: r.C_T * d.dual),
     Inequality(
         id="5.17",
         equality=True,
@@ -407,10 +425,12 @@ INEQUALITIES: tuple[Inequality, ...] = (
             thetas=everywhere,
         )
     ),
-    *_editions(
+    *_by_traces(
         "5.38",
         lambda d, r, t: r.weight(t) * d.norm_T**2,
         lambda d, r, t: r.weight(t) * (r.C_T * r.M / r.m) ** 2 * d.norm**2,
+        reading=lambda r: r.by_half.printed,
+        units=UNITS,
         thetas=above,
     ),
     *_editions("5.39", _square_of_step, lambda d, r, t: r.h_1(t) * d.norm**2, thetas=above),

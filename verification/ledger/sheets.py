@@ -124,13 +124,19 @@ def _entry(row: Row) -> Iterable[str]:
         yield f"*{s.fault.capitalize()}*{inherited}. {s.wrong}{mended}"
     yield ""
     for e in row.evidence:
-        yield f"- *{e.method}*, {e.of}, {OUTCOME[e.holds]}: {_shown(e)}"
+        yield f"- *{e.method}*, {e.of}, {outcome(e)}: {_shown(e)}"
     if s.note:
         yield ""
         yield s.note
 
 
 OUTCOME = {True: "holds", False: "false", None: "undecided"}
+
+
+def outcome(evidence: Evidence) -> str:
+    """Outcome of a piece of evidence, in words."""
+    only = " only in readings that depart from the text" if evidence.data.get("departs") else ""
+    return OUTCOME[evidence.holds] + only
 
 
 def _shown(evidence: Evidence) -> str:

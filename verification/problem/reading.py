@@ -15,6 +15,7 @@ from ndtheory import HypothesisError
 from verification.problem.colours import OddRing, Touching, neumann_bodies
 from verification.problem.specs import (
     INTERVAL_SIDES,
+    LEAST_FRICTION,
     MOST_CELLS,
     MOST_CONTRAST,
     MOST_FRICTION,
@@ -577,7 +578,9 @@ def factor(value: Any) -> Theta:
         raise Unfit(f"needed {error.needed}") from None
 
 
-coefficient = number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION)
+coefficient = number(
+    f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION, least=LEAST_FRICTION
+)
 tolerance = number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1)
 at_least_one = integer("a whole number >= 1", 1)
 

@@ -44,6 +44,10 @@ MOST_WITHIN = Fraction(10**8)
 #: Largest number of increments of a loading history, all of whose results are kept.
 MOST_INCREMENTS = 2000
 
+#: Least coefficient of friction but 0: the theorem as printed allows 1e-44 and less for steel in Pa.  Smaller ones
+#: would lead to a kappa_1 or kappa_2 that is refused.
+LEAST_FRICTION = Fraction(1, 10**70)
+
 #: Largest coefficient of friction: all contact sticks already, and larger ones would only overflow.
 MOST_FRICTION = Fraction(10**9)
 

@@ -114,8 +114,10 @@ def show(value: object) -> str:
     return short(" ".join(text.split()), LONGEST)
 
 
-def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda v: True) -> Callable[[Any], Fraction]:
-    """Return a reader of exact numbers: 0.4, 4e-1 or "2/5"; never true, NaN or infinity.
+def number(
+    needed: str = "a number", holds: Callable[[Fraction], bool] = lambda v: True, least: Fraction = SMALLEST
+) -> Callable[[Any], Fraction]:
+    """Return a reader of exact numbers, 0 or at least ``least`` in size: 0.4, 4e-1 or "2/5"; never true, NaN, infinity.
 
     The condition must hold for the number and for the double it becomes.
     """
@@ -128,8 +130,8 @@ def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda 
         except ValueError:
             unit = isinstance(value, str) and NUMBER_AND_UNIT.fullmatch(value)
             raise Unfit(f"needed {needed}" + NO_UNIT * bool(unit)) from None
-        if result and not SMALLEST <= abs(result) <= LARGEST:
-            raise Unfit(f"needed {needed}, of a size between {float(SMALLEST):g} and {float(LARGEST):g}")
+        if result and not least <= abs(result) <= LARGEST:
+            raise Unfit(f"needed {needed}, of a size between {float(least):g} and {float(LARGEST):g}")
         if not (holds(result) and holds(Fraction(float(result)))):
             raise Unfit(f"needed {needed}")
         return result

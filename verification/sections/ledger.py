@@ -7,9 +7,12 @@ from collections.abc import Iterator
 
 from ndtheory.statements import symbols
 from verification.ledger.rows import Ledger, Row
-from verification.ledger.sheets import FAULTS, OUTCOME, WORDS
+from verification.ledger.sheets import FAULTS, WORDS, outcome
 from verification.sections.numbers import count
 from verification.sections.parts import Facts, Note, Section, Sections, closing, of, section, table
+
+#: Where the verdicts are defined.
+DEFINED = Note("What each verdict means: docs/glossary.md, under verdict.", 0)
 
 
 @of.register
@@ -38,12 +41,12 @@ def _summary(found: Ledger) -> Sections:
         changed = [(row.statement.id, row.recorded or "-", row.verdict) for row in found.changed]
         sections.append(section("changed", "WHAT HAS CHANGED?", table(("statement", "recorded", "now"), changed)))
     claims = "that a numerical row is proved, or a proof of the statements that it uses"
-    return (*sections, closing(claims, then="ndtheory verify 5.30"))
+    return (*sections, closing(claims, DEFINED, then="ndtheory verify 5.30"))
 
 
 def _rows(found: Ledger) -> Sections:
     grounds = list(dict.fromkeys(id for row in found.rows for id in row.statement.leans_on))
-    return (*map(_row, found.rows), closing("", then=" ".join(["ndtheory verify", *grounds[:4]])))
+    return (*map(_row, found.rows), closing("", DEFINED, then=" ".join(["ndtheory verify", *grounds[:4]])))
 
 
 def _row(row: Row) -> Section:
@@ -66,7 +69,7 @@ def _said(row: Row) -> Iterator[Note | str]:
         yield f"uses {', '.join(s.leans_on)}"
     for e in row.evidence:
         method = f"{e.method}, {e.of}" if s.fault else e.method
-        yield f"{method}: {OUTCOME[e.holds]}.  {plain(e.text)}"
+        yield f"{method}: {outcome(e)}.  {plain(e.text)}"
         if at := e.data.get("counterexample"):
             yield Note("at " + ", ".join(f"{name} = {value}" for name, value in at.items()), 4)
     if s.note:

@@ -39,13 +39,15 @@ def figures(value: float | Number | None, digits: int = 3, unit: str = "") -> Ce
     return Quantity(number, text, unit, level)
 
 
-def near_one(value: float) -> Quantity:
-    """A rate; near 1 as its distance from 1.
+def near_one(value: float, digits: int = 4, rest: float | None = None) -> Quantity:
+    """A rate; near 1 as its distance from 1, which ``rest`` may hold with more digits.
 
-    >>> print(near_one(0.30709), near_one(1 - 1.5e-5))
-    0.3071 1 - 1.5e-05
+    >>> print(near_one(0.30709), near_one(1 - 1.5e-5), near_one(1 + 1.5e-5), near_one(1.0, rest=2e-21))
+    0.3071 1 - 1.5e-05 1 + 1.5e-05 1 - 2e-21
     """
-    return Quantity(value, f"1 - {1 - value:.2g}" if 0 < 1 - value < 1e-3 else f"{value:.4g}")
+    rest = 1 - value if rest is None else rest
+    near = f"1 {'-' if rest > 0 else '+'} {abs(rest):.{digits - 2}g}"
+    return Quantity(value, near if 0 < abs(rest) < 1e-3 else f"{value:.{digits}g}")
 
 
 def count(number: int | None, before: str = "") -> Cell:

@@ -31,6 +31,15 @@ def test_the_screen_of_a_changed_statement_fits_80_columns(call, kept, id):
     assert wide(answer) == []
 
 
+@pytest.mark.parametrize("ids", [(), ("5.30",)], ids=["summary", "row"])
+def test_the_screen_says_where_verdicts_are_defined(call, kept, ids):
+    assert "What each verdict means: docs/glossary.md, under verdict." in call("verify", *ids).out
+
+
+def test_the_screen_of_figure_10_says_that_only_a_reading_which_departs_from_the_text_shows_it(call, kept):
+    assert "holds only in readings that depart from the text" in one_line(call("verify", "fig-10").out)
+
+
 def test_the_screen_shows_what_is_claimed_what_is_wrong_and_what_was_found(call, kept, whole):
     screen = one_line(call("verify", "5.30").out)
     row = next(row for row in whole.ledger.rows if row.statement.id == "5.30")

@@ -12,7 +12,7 @@ from verification.ledger import Evidence, rows
 
 @pytest.fixture
 def found(monkeypatch):
-    """``found({"5.11": False})``: all that is found is exact, and what a statement claims holds unless it is named."""
+    """``found({"5.18": False})``: all that is found is exact, and what a statement claims holds unless it is named."""
 
     def use(holds):
         def gather(ids, level, watch):
@@ -109,19 +109,19 @@ def test_the_calculator_says_of_the_printed_proof_what_is_recorded(call, monkeyp
 
 
 def test_whatever_leans_on_a_refuted_statement_is_inconclusive(found):
-    found({"5.11": False})
+    found({"5.18": False})
     verdicts = {row.statement.id: row.verdict for row in ledger.verify().rows}
-    assert verdicts["5.11"] == "REFUTED"
-    direct = [s.id for s in STATEMENTS.values() if "5.11" in s.leans_on]
+    assert verdicts["5.18"] == "REFUTED"
+    direct = [s.id for s in STATEMENTS.values() if "5.18" in s.leans_on]
     assert direct
     assert {verdicts[id] for id in direct} == {"INCONCLUSIVE"}
     found({})
     before = {row.statement.id: row.verdict for row in ledger.verify().rows}
     changed = {id for id, verdict in verdicts.items() if verdict != before[id]}
-    assert {"5.11", *direct} <= changed <= {"5.11", *leaning_on("5.11")}
+    assert {"5.18", *direct} <= changed <= {"5.18", *leaning_on("5.18")}
 
 
-@pytest.mark.parametrize("premise", ["5.11", "4.3", "5.12"])
+@pytest.mark.parametrize("premise", ["5.18", "4.3", "5.12"])
 @pytest.mark.parametrize("holds", [False, None], ids=["refuted", "undecided"])
 def test_nothing_is_proved_from_what_is_inconclusive_for_want_of_a_premise(found, premise, holds):
     found({premise: holds})
@@ -133,18 +133,18 @@ def test_nothing_is_proved_from_what_is_inconclusive_for_want_of_a_premise(found
 @pytest.mark.parametrize("verdict", ["REFUTED", "INCONCLUSIVE"])
 def test_a_premise_that_was_not_checked_now_counts_as_recorded(call, found, record, verdict):
     found({})
-    record({"5.11": verdict})
-    answer = call("verify", "prop-5.4")
+    record({"5.18": verdict})
+    answer = call("verify", "5.29")
     assert answer.status == 1
     screen = one_line(answer.out)
     assert "INCONCLUSIVE (recorded: " in screen
-    assert f"reading: undecided. it uses 5.11 ({verdict})" in screen
-    (row,) = call("verify", "prop-5.4", "--json").document["statements"]
+    assert f"reading: undecided. it uses 5.18 ({verdict})" in screen
+    (row,) = call("verify", "5.29", "--json").document["statements"]
     assert (row["verdict"], row["method"]) == ("INCONCLUSIVE", "reading")
     assert row["evidence"][-1]["holds"] is None
 
 
 def test_a_premise_that_is_checked_now_counts_as_found_and_not_as_recorded(found, record):
     found({})
-    record({"5.11": "REFUTED"})
-    assert {row.verdict for row in ledger.verify(["5.11", "prop-5.4"]).rows} <= {"PROVED", "REPAIRED"}
+    record({"5.18": "REFUTED"})
+    assert {row.verdict for row in ledger.verify(["5.18", "5.29"]).rows} <= {"PROVED", "REPAIRED"}
