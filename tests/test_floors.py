@@ -51,7 +51,8 @@ FLOORS: dict[str, dict[str, str]] = {
     "iteration": {
         "verification": "monolithic",
         "verification.algorithm": (
-            "__init__ affine_piece ending fixed_point iterate linearisation rates reference relaxation runs start theta"
+            "__init__ affine_piece ending fixed_point iterate linearisation rates reference relaxation remedy runs "
+            "start theta"
         ),
     },
     "runs over grids": {

@@ -221,7 +221,14 @@ class History(Document):
 
     @property
     def summary(self) -> str:
-        return f"{self.problem.title}, {len(self.increments)} of {self.planned} increments by the {self.method}"
+        done = f"{self.problem.title}, {len(self.increments)} of {self.planned} increments by the {self.method}"
+        return f"{done}, the last one a {self.unfinished}" if self.unfinished else done
+
+    @property
+    def unfinished(self) -> str:
+        """The words for the values of the last increment where its run did not converge; empty where it did."""
+        last = self.increments[-1].run
+        return "" if last is None else last.unfinished
 
     @property
     def converged(self) -> bool:
@@ -248,7 +255,11 @@ class History(Document):
         """Facts that a user should know before trusting the numbers: of the first increment, and the worst checks."""
         of_checks = ("largest_strain", "penetration_outside")
         worst = [max(self.increments, key=lambda one: getattr(one.result.checks, name) or 0.0) for name in of_checks]
-        return list(dict.fromkeys(line for each in (self.increments[0], *worst) for line in each.result.warnings))
+        lines = dict.fromkeys(line for each in (self.increments[0], *worst) for line in each.result.warnings)
+        length = self.units["length"]
+        apart = [line for each in self.increments for line in each.contact.warnings(length)]  # most part, or meet later
+        nearest = min(self.increments, key=lambda one: float(one.contact.gap.min()))
+        return [line for line in lines if line not in apart] + nearest.contact.warnings(length)
 
     @cached_property
     def fields(self) -> Mapping[str, Floats]:

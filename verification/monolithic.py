@@ -103,7 +103,7 @@ class Solution(Document):
     @property
     def warnings(self) -> list[str]:
         """Reasons why the numbers may be wrong."""
-        return [*self.bodies.warnings, *self.checks.warnings]
+        return [*self.bodies.warnings, *self.contact.warnings(self.units["length"]), *self.checks.warnings]
 
     def plot(self, **options: Any) -> Figure:
         """Draw the deformed bodies above pressure, shear, friction bound and states along Gamma_c.

@@ -116,6 +116,12 @@ def test_a_run_that_does_not_converge_exits_with_1_and_says_what_to_try(call, pa
     assert answer.status == 1
     assert answer.document["ended"]
     assert "max_iterations" in answer.err
+    screen = call("march", path, "--set", "iteration.max_iterations=2").out
+    assert screen.index("Not whole:") < screen.index("Last iterate, not a solution:")
+    following = screen.splitlines()[-1].removeprefix("Next: ndtheory ")
+    assert following.startswith(f"march {path} --set iteration.max_iterations=")
+    assert following.count("iteration.max_iterations") == 1
+    assert call(*following.split()).status != 2
 
 
 def test_ctrl_c_shows_and_writes_the_increments_that_are_done(call, path, quick, tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 import errno
 import re
+import shlex
 import signal
 from dataclasses import replace
 from email.message import Message
@@ -290,11 +291,61 @@ def test_a_theta_too_small_to_move_anything_is_not_advised_to_shrink(call, write
     assert "smaller theta" not in answer.err
 
 
-def test_bodies_that_never_meet_have_no_contact_force_and_a_converged_run(call, write):
-    found = call("run", write("apart"), "--json").document
+@pytest.mark.parametrize("command", ["run", "solve"])
+def test_bodies_that_never_meet_have_no_contact_force_and_a_solution_that_says_so(call, write, command):
+    answer = call(command, write("apart"), "--json")
+    found, (line,) = answer.document, answer.err.splitlines()
+    assert answer.status == DONE
     assert found["pattern"] == {"stick": 0, "slip": 0, "open": 7}
-    assert found["converged"]
-    assert found["iterations"] < 10
+    assert found["force"]["normal"] == 0
+    assert found.get("converged", True)
+    assert found.get("iterations", 0) < 10
+    assert line == f"warning: {found['warnings'][-1]}"
+    assert "nothing touches: the bodies stay apart along Gamma_c, by at least 0.085 mm" in line
+    assert "7 open: nothing touches" in call(command, write("apart")).out
+    assert "nothing touches" not in str(call(command, write()))
+
+
+#: Runs that do not converge, with a word of what stderr says and of what is typed next.
+UNFINISHED = {
+    "wrong roles": (("stalled", "try --theta"), "--theta"),
+    "stiff upper body": (("diverged", "try --theta"), "--theta"),
+    "below rounding": (("fell to rounding",), "iteration.tolerance"),
+    "inside the theorem": (("max_iterations was reached",), "--theta"),
+}
+
+
+@pytest.mark.parametrize("edits", UNFINISHED)
+def test_a_run_that_did_not_converge_shows_no_solution_and_next_what_stderr_advises(call, write, edits):
+    file, (said, change) = write(edits), UNFINISHED[edits]
+    answer = call("run", file, "--theta", "1/1000") if edits == "inside the theorem" else call("run", file)
+    assert answer.status == NOT_MET
+    assert all(words in answer.err for words in said)
+    head, nodes = (answer.out.index(words) for words in ("  Last iterate, not a solution:", "  nodes "))
+    assert head < nodes < answer.out.index("  force ")
+    following = shlex.split(answer.out.splitlines()[-1].removeprefix("Next: ndtheory "))
+    assert following[:2] == ["run", str(file)]
+    assert change in " ".join(following)
+    assert following.count("--theta") < 2
+    for options in advised(answer.err)[:1]:
+        assert following[2:] == options
+    assert call(*following).status == (DONE if edits in ("below rounding", "wrong roles") else NOT_MET)
+    assert "Last iterate" not in call("run", write()).out
+
+
+def test_a_run_that_needs_a_little_longer_is_continued_next(call, write):
+    answer = call("run", write({"iteration.max_iterations": "12"}))
+    assert "max_iterations was reached" in answer.err
+    following = answer.out.splitlines()[-1].removeprefix("Next: ndtheory ")
+    assert call(*shlex.split(following)).status == DONE
+
+
+def test_a_rule_that_takes_its_own_step_is_replaced_next(call, write):
+    edits = {"contact.friction": "0", "iteration.relaxation": '"momentum"', "iteration.max_iterations": "1"}
+    answer = call("run", write(edits | {"iteration.theta": None}))
+    following = shlex.split(answer.out.splitlines()[-1].removeprefix("Next: ndtheory "))
+    assert following[2:4] == ["--relaxation", "constant"]
+    assert call(*following).status == NOT_MET
 
 
 def test_a_remedy_is_no_division_by_zero_where_one_grid_is_coarser(call, tmp_path):

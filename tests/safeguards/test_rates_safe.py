@@ -133,8 +133,8 @@ def test_a_step_has_the_noise_of_both_its_ends_and_none_begins_near_it():
         float((Fraction(1, 8) + Fraction(1, 2**9)) / (Fraction(1, 4) - Fraction(1, 2**10)))
     )
     assert largest_step_ratio(PLAIN, states([1.0, 2.0**-9], [2.0**-9, 2.0**-8])).lo == 0
-    far = largest_step_ratio(PLAIN, states([1.0, 0.5, 0.375], [2.0**-40, 2.0**-20, 2.0**-20]))
-    assert (far.value, far.steps) == (0.5, 1)
+    near = largest_step_ratio(PLAIN, states([1.0, 0.5, 0.375], [2.0**-40, 2.0**-20, 2.0**-20]))
+    assert (near.value, near.steps) == (0.75, 2)
     assert largest_step_ratio(PLAIN, states([1.0, 0.5], [2.0**-5] * 2)) is None
     lost = largest_step_ratio(PLAIN, states([1.0, 3.0, float("inf")], [2.0**-50] * 3))
     assert lost.value == 3

@@ -20,7 +20,8 @@ import verification as vf
 from ndtheory.energy_norms import one_minus_square, predicted_factor
 from verification.contact import ContactError
 from verification.exploration import page
-from verification.exploration.film import STATES, steps_shown
+from verification.exploration.film import STATES, film, packed, steps_shown
+from verification.progress import silent
 
 #: A page of a problem with 25 contact nodes weighs at most so many bytes.
 LARGEST = 1_500_000
@@ -61,7 +62,7 @@ def test_each_position_is_a_run(found, data):
     for role, k, theta in places(found, 8):
         made, shown = run_at(found, role, k, theta), data["roles"][role]["runs"][k][theta]
         assert (shown["outcome"], shown["steps"]) == (made.outcome, made.iterations)
-        assert shown["residuals"] == pytest.approx([made.history[step] for step in shown["shown"]], rel=5e-3)
+        assert shown["residuals"] == pytest.approx(made.history, rel=5e-3)
         rate = made.observed_rate
         assert shown["rate"] == (None if rate is None else pytest.approx(rate.value, rel=1e-3))
 
@@ -113,6 +114,29 @@ def test_later_steps_are_shown_more_rarely_and_the_last_one_always():
     assert shown[-1] == 399
     assert len(shown) <= 21
     assert list(np.diff(shown)[:-1]) == sorted(np.diff(shown)[:-1])
+
+
+def test_a_step_that_leaves_the_picture_leaves_out_no_later_one():
+    """A run that stalls goes to and fro: every second step is further than the others."""
+    pair = vf.build(vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.2", neumann_body=2))
+    made = vf.run(pair, theta="0.9", rule="constant")
+    sizes = [max(float(np.abs(u).max()) for u in made.traces_at(each)) for each in made.iterates]
+    farthest = max(sizes) / 2
+    found = film(pair, vf.measure(pair), [made.theta], [pair.friction], farthest, silent)
+    (shown,) = found.runs[0]
+    assert made.outcome == "stalled"
+    assert shown.residuals == tuple(made.history)
+    assert list(shown.steps) == [i for i in steps_shown(made.history) if sizes[i] <= farthest]
+    assert shown.left_out == len(steps_shown(made.history)) - len(shown.steps) > 0
+    assert len(shown.steps) == len(shown.frames) == len(shown.sizes) > 5
+    (told,) = packed(found)["runs"][0]
+    assert (told["leftOut"], len(told["residuals"])) == (shown.left_out, made.evaluations)
+
+
+def test_a_contact_body_so_soft_that_the_predicted_theta_is_nearly_1_is_explored():
+    found = vf.explore(vf.example("two-bars").changed(young=(7, 70000)))
+    assert min(one.measured.rho_max.value for one in found.films) < 1e-3
+    assert max(found.thetas) == Fraction(999, 1000)
 
 
 def test_a_body_that_contact_alone_holds_keeps_its_role():

@@ -394,3 +394,13 @@ def test_warnings_name_the_worst_state_of_the_history_once():
     told = [line for line in found.warnings if "strain" in line]
     assert sum(strain > 0.05 for strain in strains) > 1
     assert told == [line for line in found.increments[-1].result.warnings if "strain" in line]
+
+
+def test_bodies_that_part_are_warned_of_only_where_they_never_meet():
+    lifts = {"press": (1, [0, "-0.01"]), "lift": (1, [0, "0.01"])}
+    far = {"near": (1, [0, "-0.001"]), "nearer": (1, [0, "-0.002"])}
+    apart = {"contact": {"gap": "0.005"}}
+    for method in ("iteration", "monolithic"):
+        for path, more, said in ((lifts, {}, 0), (lifts, apart, 0), (far, apart, 1)):
+            found = vf.march(problem(path, **more), method=method)
+            assert sum("nothing touches" in line for line in found.warnings) == said

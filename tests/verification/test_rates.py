@@ -10,11 +10,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from chain_problems import case, run_of
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.rates import CLEAR_OF_NOISE, largest_step_ratio, noise, observed_rate, rate_at_the_end
 from verification.algorithm.runs import Run, run
+from verification.verdicts import TIGHT, judge
 
 EPSILON = sys.float_info.epsilon
 
@@ -98,9 +101,37 @@ def test_a_step_begins_clear_of_the_noise_and_may_end_below_it():
     assert below.lo == 0.0
 
 
-def test_steps_far_above_the_noise_count_alone_where_there_are_any():
-    seen = largest_step_ratio(PAIR, states([1.0, 0.1, 0.09], [1e-10, 1e-4, 1e-4]))
-    assert (seen.value, seen.steps) == (0.1, 1)
+def test_every_clear_step_counts_below_and_only_those_furthest_from_the_noise_above():
+    near = largest_step_ratio(PAIR, states([1.0, 0.1, 0.09], [1e-10, 1e-4, 1e-4]))
+    assert (near.value, near.steps) == (pytest.approx(0.9), 2)
+    assert near.lo == pytest.approx((0.09 - 1e-4) / (0.1 + 1e-4), rel=1e-12)
+    assert near.hi == near.value
+    hidden = largest_step_ratio(PAIR, states([1.0, 0.5, 0.2525], [1e-12, 1e-12, 1e-2]))
+    assert (hidden.value, hidden.steps) == (0.5, 2)  # 0.505 +- 0.02 shows no more than 0.5 does
+    assert hidden.hi == pytest.approx((0.2525 + 1e-2) / (0.5 - 1e-12), rel=1e-12)  # as far from the noise as the first
+
+
+def test_where_no_step_is_eight_digits_above_the_noise_those_furthest_from_it_give_the_upper_end():
+    """The last step, within a per cent, would leave a bound of 0.505 undecided."""
+    seen = largest_step_ratio(PAIR, states([1.0, 0.5, 0.25, 0.01, 0.005], [1e-6, 1e-6, 1e-6, 1e-6, 9e-5]))
+    assert seen.hi == pytest.approx((0.25 + 1e-6) / (0.5 - 1e-6), rel=1e-12)
+    assert judge(0.505, seen, "").verdict == "CONSISTENT"
+    assert judge(0.499, seen, "").verdict == "VIOLATED"
+
+
+@pytest.mark.parametrize("seed", range(40) if AT_NIGHT else (0, 1, 5))
+def test_a_bound_just_below_any_step_that_is_clear_of_the_noise_is_violated(seed):
+    """By the lower end of that step: a false bound does not pass because other steps are further from the noise."""
+    pair, measured, theta, _ = case(seed, tolerance=1e-12, max_iterations=500)
+    done = run_of(pair, measured, theta).iterates
+    floors, residuals = [noise(pair, each) for each in done], [each.residual for each in done]
+    steps = [i for i in range(len(done) - 1) if residuals[i] > CLEAR_OF_NOISE * floors[i]]
+    low = [(residuals[i + 1] - floors[i + 1]) / (residuals[i] + floors[i]) for i in steps]
+    seen = largest_step_ratio(pair, done)
+    assert (seen.steps, seen.lo) == (len(steps), pytest.approx(max(low), rel=1e-12))
+    for end in low:
+        bound = end - 2 * TIGHT * (1 - end)
+        assert judge(bound, seen, "").verdict == "VIOLATED"
 
 
 def test_a_start_at_the_solution_takes_no_step():

@@ -166,6 +166,24 @@ def test_a_notebook_shows_what_the_screen_shows(results, name):
     assert "\x1b" not in view
 
 
+def test_what_did_not_converge_is_called_no_solution_in_every_view(results, problem):
+    """And the notebook names the change that a command reports on stderr."""
+    short = replace(problem, iteration=replace(problem.iteration, max_iterations=3))
+    steps = [{"increments": 2, "body2": {"prescribed": {"top": [0, "-0.01"]}}}]
+    run, history = vf.run(short), vf.march(vf.Problem.from_dict(short.to_dict() | {"step": steps}))
+    for result in (run, history):
+        assert "last iterate, not a solution" in repr(result)
+        assert "Last iterate, not a solution:" in result._repr_html_()
+        assert "raise it, or change theta" in " ".join(result._repr_html_().split())
+        figure = result.plot("bodies") if result is run else result.plot()
+        assert "last iterate, not a solution" in " ".join(text.get_text() for text in figure.axes[0].texts)
+    assert run.remedy.key == "iteration.max_iterations"
+    assert vf.run(short.with_keys({run.remedy.key: run.remedy.value})).converged
+    for result in (results["Run"], results["Solution"]):
+        assert "not a solution" not in repr(result) + result._repr_html_()
+    assert results["Run"].remedy is None
+
+
 def test_what_has_no_screen_is_shown_as_its_document():
     S = np.diag([2.0, 3.0])
     run = vf.run(vf.build(S1=S, S2=np.eye(2), load2=np.array([0.0, -1.0]), x=np.array([0.0])))

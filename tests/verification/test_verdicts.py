@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from chain_problems import case, run_of
+from chain_problems import case, relaxation_factor, run_of
 from problem_list import bars, blocks
 from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory import Number
 from verification.algorithm.linearisation import NotLinear, forecast
-from verification.algorithm.rates import StepRatio
+from verification.algorithm.rates import StepRatio, largest_step_ratio
 from verification.bounds import LARGEST
 from verification.bounds.bound import Subject
 from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
 from verification.comparison import compare
+from verification.constants import measure
 from verification.interface.files import read_interface, write_interface
-from verification.verdicts import TIGHT, judge, judge_forecast
+from verification.interface.pair import pair_from
+from verification.ledger.cases import problem
+from verification.verdicts import TIGHT, judge, judge_bound, judge_forecast
 
 BOUND = 0.5
 SLACK = TIGHT * (1 - BOUND)
@@ -193,13 +198,31 @@ def forecasts(count: int):
             yield done
 
 
-def test_forecasts_come_true():
-    """In all of the 88 of the first 150 random problems that allow one; here 40 problems."""
-    count = 40 if AT_NIGHT else 20
-    some = list(forecasts(count))
-    assert len(some) > 3 / 8 * count
-    assert [judge_forecast(done).verdict for done in some].count("VIOLATED") == 0
-    assert all(0 < done.forecast.made_at_iteration < done.forecast.iterations for done in some)
+def test_no_forecast_and_no_proved_bound_is_violated_down_to_tolerances_near_rounding():
+    """Of 2,000 problems 922 allow a forecast, and the energy bound proves a factor in 687.
+
+    The verdict is inconclusive only where the run attains the bound to seven digits.
+    """
+    forecasts, bounds = Counter(), Counter()
+    for seed in range(2000 if AT_NIGHT else 20):
+        random = np.random.default_rng([seed, 7])
+        tolerance = float(f"{10 ** random.uniform(-12.3, -6):.1e}")
+        matching = bool(random.integers(2))
+        pair = pair_from(problem(random, matching=matching, tolerance=tolerance, max_iterations=500))
+        measured = measure(pair)
+        done = run_of(pair, measured, relaxation_factor(random, measured.rho_max.value))
+        forecasts[judge_forecast(done).verdict] += 1
+        bound = BOUNDS["energy"].evaluate(Subject.of(pair, measured), done.theta)
+        seen = largest_step_ratio(pair, done.iterates)
+        verdict = judge_bound(bound, seen, "").verdict
+        attained = verdict == "INCONCLUSIVE" and abs(seen.value / bound.factor.value - 1) < 1e-7
+        bounds["attained" if attained else verdict] += 1
+        made = done.forecast
+        assert made is None or 0 < made.made_at_iteration < made.iterations
+    assert forecasts["CONSISTENT"] > 3 / 8 * forecasts.total()
+    assert forecasts["VIOLATED"] == 0
+    assert bounds["CONSISTENT"] > 1 / 8 * bounds.total()
+    assert bounds["VIOLATED"] == bounds["INCONCLUSIVE"] == 0
 
 
 def test_a_forecast_looks_at_no_state_after_the_one_it_is_made_at():

@@ -20,6 +20,9 @@ from verification.problem import Settings
 
 Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
 
+#: The words for the values at the end of a run that did not converge.
+LAST_ITERATE = "last iterate, not a solution"
+
 #: A run without a new least residual over so many steps has stalled.
 PATIENCE = 50
 

@@ -13,7 +13,7 @@ from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.rates import CLEAR_OF_NOISE, noise, noises, observed_rate, rate_at_the_end, settled
+from verification.algorithm.rates import CLEAR_OF_NOISE, noise, noises, observed_rate, rate_of
 from verification.interface.pair import ContactPair
 from verification.monolithic import solution_force
 
@@ -225,15 +225,12 @@ def forecast(pair: ContactPair, iterates: Sequence[Iterate], theta: float, toler
             raise NotLinear(f"the forecast at iteration {half} is that {most} iterations do not suffice")
         error = near.J @ error
         residuals.append(near.step(error) / theta)
-        floors.append(floors[-1])
-    if len(residuals) < 3:
+    more = len(residuals) - len(seen)
+    patterns = [s.contact.pattern for s in seen] + [iterate.contact.pattern] * more
+    rate = rate_of(residuals, floors + floors[-1:] * more, patterns)  # over the steps that the observed one takes
+    if rate is None:
         raise NotLinear("the run is too short for a rate")
-    return Forecast(
-        made_at_iteration=half,
-        rate=rate_at_the_end(residuals, floors, settled([s.contact.pattern for s in seen])).value,
-        iterations=len(residuals) - 1,
-        tolerance=tolerance,
-    )
+    return Forecast(made_at_iteration=half, rate=rate.value, iterations=len(residuals) - 1, tolerance=tolerance)
 
 
 def _same(a: Piece, b: Piece) -> bool:

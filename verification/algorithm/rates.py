@@ -14,7 +14,8 @@ from verification.interface.pair import ContactPair
 #: Residuals below this multiple of their noise are not used.
 CLEAR_OF_NOISE = 100.0
 
-#: A residual above this multiple of its noise gives a step ratio with eight digits.
+#: Steps from residuals above this multiple of their noise, or within a decade of the run's largest multiple, give the
+#: upper end of a step ratio: eight digits.
 FAR_FROM_NOISE = 1e8
 
 
@@ -150,8 +151,10 @@ class StepRatio:
 
     Attributes
     ----------
-    value, lo, hi : float
-        0 where no step was taken.
+    value, lo : float
+        The step whose lower end by its own noise is largest; 0 where no step was taken.
+    hi : float
+        The largest upper end of the steps furthest from the noise, at least ``value``.
     steps : int
         Number of steps it was taken over; 0 where the start is the solution.
     """
@@ -165,8 +168,9 @@ class StepRatio:
 def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRatio | None:
     """Return the largest step ratio clear of the noise, or None where there is none.
 
-    A step is judged by the noise of its two iterates; it may end below the noise, not begin there.  Where steps
-    begin far above it, only these count.
+    A step is judged by the noise of its two iterates; it may end below the noise, not begin there.  Every clear step
+    counts for the lower end.  Only the steps furthest from the noise count for the upper end: a step near the noise
+    would raise it by rounding.
     """
     if not iterates:
         return None
@@ -174,17 +178,17 @@ def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRa
         return StepRatio(value=0.0, lo=0.0, hi=0.0, steps=0)
     residual: Floats = np.array([iterate.residual for iterate in iterates])
     floor: Floats = np.array(noises(pair, iterates))
-    for multiple in (FAR_FROM_NOISE, CLEAR_OF_NOISE):
-        begins = np.flatnonzero((residual[:-1] > multiple * floor[:-1]) & np.isfinite(residual[1:]))
-        if len(begins):
-            break
-    else:
+    begins = np.flatnonzero((residual[:-1] > CLEAR_OF_NOISE * floor[:-1]) & np.isfinite(residual[1:] + floor[1:]))
+    if not len(begins):
         return None
     before, after = residual[begins], residual[begins + 1]
     error_before, error_after = floor[begins], floor[begins + 1]
+    lo, hi = (after - error_after) / (before + error_before), (after + error_after) / (before - error_before)
+    most, level = int(np.argmax(lo)), min(FAR_FROM_NOISE, 0.1 * float((before / error_before).max()))
+    value = float(after[most] / before[most])
     return StepRatio(
-        value=float((after / before).max()),
-        lo=max(float(((after - error_after) / (before + error_before)).max()), 0.0),
-        hi=float(((after + error_after) / (before - error_before)).max()),
+        value=value,
+        lo=max(float(lo[most]), 0.0),
+        hi=max(float(hi[before >= level * error_before].max()), value),
         steps=len(begins),
     )

@@ -15,12 +15,13 @@ from numpy.typing import ArrayLike
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from ndtheory.number import Numeric
-from verification.algorithm.ending import NO_FORCE, Ending, Outcome, arrived, coupled_residual
+from verification.algorithm.ending import LAST_ITERATE, NO_FORCE, Ending, Outcome, arrived, coupled_residual
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, at_solution, forecast, linearise
 from verification.algorithm.rates import ObservedRate, observed_rate
 from verification.algorithm.relaxation import Constant, Rule, rule_of
+from verification.algorithm.remedy import Remedy, remedy_of
 from verification.algorithm.start import Start, begin_at
 from verification.algorithm.theta import Choice, choose
 from verification.constants import Measured
@@ -117,6 +118,29 @@ class Run(Document):
     def converged(self) -> bool:
         """True if the residual fell to the tolerance, relative to the present forces, in a state of contact."""
         return self.outcome == "converged"
+
+    @property
+    def unfinished(self) -> str:
+        """The words for the values at the end of a run that did not converge; empty where it did."""
+        return "" if self.converged else LAST_ITERATE
+
+    @cached_property
+    def remedy(self) -> Remedy | None:
+        """The change to try where the run did not converge; None where it did, or was interrupted.
+
+        It may measure rho for both roles.
+        """
+        if self.outcome in ("converged", "interrupted"):
+            return None
+        return remedy_of(
+            self.pair,
+            self.rule,
+            float(self.theta),
+            outcome=self.outcome,
+            last=self.last,
+            rate=self.observed_rate,
+            coupled=self.coupled_residual,
+        )
 
     @cached_property
     def coupled_residual(self) -> float | None:
@@ -249,7 +273,8 @@ class Run(Document):
     @property
     def summary(self) -> str:
         rate = "" if self.observed_rate is None else f", observed rate {self.observed_rate.value:.4g}"
-        return f"{self.pair.title}, {self.outcome} after {self.iterations} steps at theta {float(self.theta):.4g}{rate}"
+        ended = f"{self.outcome} after {self.iterations} steps at theta {float(self.theta):.4g}{rate}"
+        return ", ".join(filter(None, (self.pair.title, ended, self.unfinished)))
 
     def table(self) -> dict[str, list[Any]]:
         """Return the history as columns, one row for each evaluation of T: ``pandas.DataFrame(run.table())`` reads it.
@@ -272,7 +297,8 @@ class Run(Document):
     def warnings(self) -> list[str]:
         """Facts that a user should know before trusting the numbers."""
         tied = [self.start.why] if self.start.source == "tied" else []
-        return self.pair.warnings + self.choice.warnings + tied + (list(self.checks.warnings) if self.converged else [])
+        state = [*self.contact.warnings(self.units["length"]), *self.checks.warnings] if self.converged else []
+        return self.pair.warnings + self.choice.warnings + tied + state
 
     def plot(self, view: str = "residuals", **options: Any) -> Figure:
         """Draw the "residuals" over the steps, or the "bodies" at the last iterate; ValueError for another word.

@@ -10,7 +10,7 @@ import click
 
 from verification.cli.console import complain, deliver, stages
 from verification.cli.options import FOLDER, JSON, OneOf, Typed, of_a_run
-from verification.cli.problems import load_problem, remedy, warn
+from verification.cli.problems import complain_of, load_problem, warn
 
 if TYPE_CHECKING:
     from verification.history import Increment
@@ -66,6 +66,6 @@ def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bo
     last = found.increments[-1].result
     if found.interrupted:
         return 130
-    if isinstance(last, Run) and not last.converged:
-        complain(remedy(last, changes["swap"]))
+    if isinstance(last, Run):
+        complain_of(last, changes["swap"])
     return 0 if found.converged and not found.proved_violated else 1

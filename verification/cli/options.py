@@ -162,10 +162,12 @@ class Typed:
             return nothing_typed(part)
         first, *options = part.words
         words = ["ndtheory", first, self._place()]
-        words += [word for key, value in self.keys.items() for word in ("--set", f"{key}={value}")]
+        again = {option.partition("=")[0] for option in options}
+        words += [word for key, value in self.keys.items() if key not in again for word in ("--set", f"{key}={value}")]
         if part.iteration:
             given = {"--theta": self.theta, "--relaxation": self.relaxation}
-            words += [word for name, value in given.items() if value is not None for word in (name, value)]
+            kept = {name: value for name, value in given.items() if value is not None and name not in options}
+            words += [word for pair in kept.items() for word in pair]
         words += ["--swap-roles"] * (self.swap != part.exchanged)
         words += options
         return " ".join(map(quote, words)) if all(word.isprintable() for word in words) else ""

@@ -20,7 +20,6 @@ from verification.cli.options import FILE, FOLDER, JSON, SET, SWAP, Typed, folde
 if TYPE_CHECKING:
     from verification.algorithm.runs import Run
     from verification.comparison import Comparison
-    from verification.interface.pair import ContactPair
     from verification.problem.specification import Problem
 
 
@@ -194,7 +193,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
     with stages() as tell:
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
-    warn(list(solution.checks.warnings))
+    warn(solution.warnings[len(bodies.warnings) :])
     deliver(solution, run.solution, as_json, write, folder, typing=Typed(file=file, keys=keys).command)
     return 0
 
@@ -313,8 +312,7 @@ def _status_of_run(finished: Run, swapped: bool) -> int:
         ended = "" if finished.outcome == "interrupted" else f"the run had ended ({finished.outcome}), "
         complain(f"interrupted after {ended}{finished.evaluations} evaluations of T: what was computed is kept")
         return 130
-    if not finished.converged:
-        complain(remedy(finished, swapped))
+    complain_of(finished, swapped)
     return 0 if finished.converged else 1
 
 
@@ -330,49 +328,10 @@ def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:
     return 3 if comparison.inconclusive else 0
 
 
-def remedy(finished: Run, swapped: bool) -> str:
-    """Advice after a run that did not converge, with ``--swap-roles`` or without, in one sentence."""
-    from ndtheory.number import directed
-    from verification.algorithm.ending import MOST
-    from verification.algorithm.rates import noise
-    from verification.constants import measure
-
-    pair, theta, last = finished.pair, float(finished.theta), finished.last
-    apart = finished.coupled_residual is not None and finished.coupled_residual > MOST
-    if finished.outcome == "limit" and not apart:
-        return "not converged: max_iterations was reached while the residual still fell; raise it, or change theta"
-    if last.residual <= 100 * noise(pair, last):
-        reached = f"{last.relative_residual:.1e}"
-        return f"{finished.outcome}: the residual fell to rounding, {reached}; the tolerance must be larger than that"
-    if theta < 1e-9:
-        return f"{finished.outcome}: a step of theta = {theta:g} is lost in rounding; try a larger theta"
-    rho = measure(pair)
-    here = f"{finished.outcome}: theta = {theta:g} does not contract here"
-    if finished.outcome == "limit":
-        here = "not converged: max_iterations was reached far from a state of contact"
-    roles = "without --swap-roles" if swapped else "--swap-roles"
-    exchanged = _exchanged(pair)
-    assert rho.rho_max is not None  # a run has interface matrices
-    beside = None if exchanged is None else measure(exchanged).rho_max
-    good, other = _worth_trying(rho.rho_max.value), 0.0 if beside is None else _worth_trying(beside.value)
-    typed = lambda value: f"{directed(value, 3, up=False):g}"
-    better = f", or {roles} with --theta {typed(other)}" if other > good else ""
-    if theta <= good:
-        return f"{here}; try --theta {typed(theta / 2)}{better}"
-    return f"{here}; try --theta {typed(good)} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
-
-
-def _exchanged(pair: ContactPair) -> ContactPair | None:
-    """The pair with its roles exchanged; None if these roles are refused."""
-    try:
-        return pair.swapped()
-    except ValueError:  # problem errors are such
-        return None
-
-
-def _worth_trying(rho: float) -> float:
-    """2/(2 + rho), and below 1 when it is written with a few figures."""
-    return min(2 / (2 + rho), 0.99)
+def complain_of(finished: Run, swapped: bool) -> None:
+    """Report the remedy of a run that did not converge, with ``--swap-roles`` or without."""
+    if (change := finished.remedy) is not None:
+        complain(change.sentence("--theta", "without --swap-roles" if swapped else "--swap-roles"))
 
 
 def unreached() -> list[str]:

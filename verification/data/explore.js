@@ -149,12 +149,12 @@ nd.onPage("explore", (figure) => {
 
     function drawResiduals(run, i) {
       const seen = run.residuals.filter((r) => r > 0), low = Math.min(data.tolerance / 10, ...seen), high = Math.max(1, ...seen) * 2;
-      residuals.axes({ low: 0, high: 1.04 * Math.max(run.shown[run.shown.length - 1] || 1, 1), name: "step" }, { low, high, log: true, name: "relative residual" });
+      residuals.axes({ low: 0, high: 1.04 * Math.max(run.residuals.length - 1, 1), name: "step" }, { low, high, log: true, name: "relative residual" });
       residuals.clear();
-      const points = run.shown.map((s, j) => [s, Math.max(run.residuals[j], low)]);
+      const points = run.residuals.map((r, s) => [s, r === null ? null : Math.max(r, low)]).filter(([, r]) => r !== null);
       residuals.line([[0, data.tolerance], [1e6, data.tolerance]], { stroke: nd.COLOURS.grey, "stroke-dasharray": "4 3" });
       if (points.length > 1) residuals.line(points, { stroke: nd.COLOURS.blue });
-      points.forEach(([x, y], j) => residuals.dot(x, y, j === i ? { class: "here", r: 6 } : { fill: nd.COLOURS.blue, r: 2.5 }));
+      points.forEach(([s, r]) => residuals.dot(s, r, s === run.shown[i] ? { class: "here", r: 6 } : { fill: nd.COLOURS.blue, r: run.shown.includes(s) ? 2.5 : 2 }));
     }
 
     function drawMap(role) {
@@ -194,13 +194,14 @@ nd.onPage("explore", (figure) => {
       const best = data.bounds.map(({ name }, b) => [name, run.factors[b]]).filter(([, factor]) => factor !== null).sort((a, b) => a[1] - b[1])[0];
       const rate = run.rate === null || run.outcome !== "converged" ? "" : `, each leaving ${number(run.rate)} of the error`;
       says.textContent = `theta = ${number(data.theta[theta.value])}, k = ${number(data.friction[k])}, Neumann body ${role.neumann} (${role.name}): ${ended(run)}${rate}. `
-        + (best ? `Bound for any loads (${best[0]}, in doubles): at most ${number(best[1])} of the error is left by a step.` : "No bound proves that a step contracts here.");
+        + (best ? `Bound for any loads (${best[0]}, in doubles): at most ${number(best[1])} of the error is left by a step.` : "No bound proves that a step contracts here.")
+        + (run.leftOut ? ` The bodies leave the picture: ${run.leftOut} of ${run.leftOut + run.shown.length} drawings of this run are left out.` : "");
       stageTitle.textContent = last < 0 ? "The bodies" : `The bodies at step ${run.shown[i]}`;
       stepText.textContent = last < 0 ? "none" : `${run.shown[i]} of ${run.steps}`;
       drawResiduals(run, i);
       drawMap(role);
       drawFactors(role, k);
-      nd.fill(table, ["step", "relative residual"], run.shown.map((s, j) => [s, nd.digits(run.residuals[j])]));
+      nd.fill(table, ["step", "relative residual"], run.residuals.map((r, s) => [s, r === null ? "too large for a number" : nd.digits(r)]));
     };
   }
 

@@ -24,14 +24,14 @@ from verification.interface.pair import ContactPair
 from verification.problem.tables import ProblemError
 from verification.progress import Progress
 
-#: A step is drawn until the relative residual is below this: later steps look the same at the size of a page.
+#: The bodies are drawn until the relative residual is below this: later steps look the same at the size of a page.
 VISIBLE = 1e-3
 
-#: Number of first steps that are all shown, and of steps that are shown of one run at most.
+#: Number of first steps at which they are all drawn, and of steps of one run at most.
 FIRST, MOST = 10, 20
 
-#: Steps in which a displacement is larger than this multiple of the largest one of the problem's own run leave the
-#: picture.
+#: Bodies are not drawn at steps in which a displacement is larger than this multiple of the largest one of the
+#: problem's own run: they leave the picture.
 FARTHEST = 10.0
 
 #: Numbers of a lift that are stored of the whole mesh; of a larger one only the boundary is drawn.
@@ -43,7 +43,7 @@ STATES = ("stick", "slip", "open")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Shown:
-    """One run, and the steps that a page shows.
+    """One run as a page shows it.
 
     Attributes
     ----------
@@ -51,8 +51,12 @@ class Shown:
     outcome : str
         As of a run; or why there is none.
     iterations, rate : int or None, float or None
-    steps, residuals : tuple of int, tuple of float
-        The shown steps, and their relative residuals.
+    residuals : tuple of float
+        The relative residual of every step.
+    steps : tuple of int
+        The steps at which the bodies are drawn.
+    left_out : int
+        Number of steps at which they would be drawn, but leave the picture.
     frames : int8 array, shape (steps, bytes)
         By step: displacements along Gamma_c of body 1 and of body 2, pressure and shear at the contact nodes, each in
         127ths of its size; the states of these nodes.
@@ -67,8 +71,9 @@ class Shown:
     outcome: str
     iterations: int | None
     rate: float | None
-    steps: tuple[int, ...]
     residuals: tuple[float, ...]
+    steps: tuple[int, ...]
+    left_out: int
     frames: NDArray[np.int8]
     sizes: tuple[tuple[float, float], ...]
     factors: dict[str, float | None]
@@ -106,7 +111,7 @@ def film(
 ) -> Film:
     """Run every theta at every friction with constant relaxation, and evaluate the bounds there.
 
-    A step in which a displacement is larger than ``farthest`` leaves the picture, and is not shown.
+    The bodies are not drawn at a step in which a displacement is larger than ``farthest``.
     """
     calculated = [bound for bound in BOUNDS.values() if bound.calculated]
     regions: dict[str, Region] = {}
@@ -143,25 +148,19 @@ def _shown(pair: ContactPair, theta: Fraction, farthest: float, factors: dict[st
         made = run(pair, theta=theta, rule="constant")
     except ContactError as error:
         at |= {"outcome": str(error), "iterations": None, "rate": None, "steps": (), "residuals": ()}
-        return Shown(**at, frames=np.zeros((0, 0), np.int8), sizes=())
-    steps: list[int] = []
-    frames, sizes = [], []
-    for step in steps_shown(made.history):
-        frame, size = _frame(made, step)
-        if size[0] > farthest and steps:
-            break
-        steps.append(step)
-        frames.append(frame)
-        sizes.append(size)
+        return Shown(**at, left_out=0, frames=np.zeros((0, 0), np.int8), sizes=())
+    candidates = {step: _frame(made, step) for step in steps_shown(made.history)}
+    near = {step: each for step, each in candidates.items() if each[1][0] <= farthest or not step}
     return Shown(
         **at,
         outcome=made.outcome,
         iterations=made.iterations,
         rate=None if made.observed_rate is None else made.observed_rate.value,
-        steps=tuple(steps),
-        residuals=tuple(made.history[step] for step in steps),
-        frames=np.stack(frames),
-        sizes=tuple(sizes),
+        residuals=tuple(made.history),
+        steps=tuple(near),
+        left_out=len(candidates) - len(near),
+        frames=np.stack([frame for frame, _ in near.values()]),
+        sizes=tuple(size for _, size in near.values()),
     )
 
 
@@ -175,8 +174,9 @@ def past(history: History) -> Shown:
         outcome=history.ended or "converged",
         iterations=sum(each.iterations for each in runs),
         rate=None,
-        steps=tuple(range(1, len(runs) + 1)),
         residuals=tuple(each.last.relative_residual for each in runs),
+        steps=tuple(range(1, len(runs) + 1)),
+        left_out=0,
         frames=np.stack([frame for frame, _ in shown]),
         sizes=tuple(size for _, size in shown),
         factors={name: None if bound.factor is None else bound.factor.value for name, bound in history.bounds.items()},
@@ -196,7 +196,7 @@ def told(history: History) -> dict[str, Any]:
 
 
 def steps_shown(history: Sequence[float]) -> list[int]:
-    """The steps of a run that are shown: the first ones, ever fewer while the residual is visible, and the last one.
+    """The steps at which bodies are drawn: the first ones, ever fewer while the residual is visible, the last one.
 
     >>> steps_shown([1, 0.1, 1e-2, 1e-4, 1e-6, 1e-9])
     [0, 1, 2, 3, 5]
@@ -211,7 +211,7 @@ def packed(found: Film) -> dict[str, Any]:
     """The runs of a film as data of a page: numbers of each run, and all frames as one text in base 64."""
     every = [each for line in found.runs for each in line]
     firsts = iter(np.cumsum([0, *(len(each.steps) for each in every)]).tolist())
-    rounded = lambda value, digits: None if value is None else float(f"{value:.{digits}g}")
+    rounded = lambda value, digits: None if value is None or not np.isfinite(value) else float(f"{value:.{digits}g}")
     runs = [
         [
             {
@@ -219,6 +219,7 @@ def packed(found: Film) -> dict[str, Any]:
                 "steps": each.iterations,
                 "rate": rounded(each.rate, 4),
                 "shown": each.steps,
+                "leftOut": each.left_out,
                 "residuals": [rounded(value, 3) for value in each.residuals],
                 "factors": [rounded(value, 6) for value in each.factors.values()],
                 "first": next(firsts),

@@ -13,7 +13,9 @@ import numpy as np
 
 from ndtheory import __version__
 from ndtheory.energy_norms import one_minus_square, predicted_factor, predicted_theta
+from ndtheory.number import directed
 from verification.algorithm.runs import run
+from verification.algorithm.theta import below_one
 from verification.bounds.bound import Region
 from verification.bounds.table import named
 from verification.constants import measure
@@ -233,7 +235,7 @@ def _grid(pair: ContactPair, problem: Problem, progress: Progress) -> Exploratio
         why = str(error)
     measured = [measure(each) for each in pairs]
     rhos = [one.rho_max for one in measured if one.rho_max is not None]
-    predicted = (Fraction(f"{float(predicted_theta(rho.value)):.3g}") for rho in rhos)
+    predicted = (Fraction(directed(below_one(predicted_theta(rho.value)), 3, up=False)) for rho in rhos)
     thetas = tuple(sorted({made.theta, *predicted, *(Fraction(n, 20) for n in range(1, 20))}))
     frictions = _frictions(pair)
     films = [

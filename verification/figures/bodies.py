@@ -73,7 +73,7 @@ def draw_bodies(result: Run | Solution, *, stress: str = "", motions: bool = Fal
         else:
             legend_beside(axes[0])
         if isinstance(result, Run) and not result.converged:
-            style.mark_unfinished(axes[0], result.outcome)
+            style.mark_unfinished(axes[0], result.outcome, result.unfinished)
         length = plain(bodies.problem.units["length"])
         if named:
             _draw_tractions(axes[0], contact, bodies, drawn)

@@ -38,7 +38,8 @@ def draw_history(history: History, view: str = "loop", **options: Any) -> Figure
     with styled():
         figure = views[view](history, **options)
         if not history.converged and view != "shear":
-            mark_unfinished(figure.axes[0], f"{len(history.increments)} of {history.planned} increments")
+            done = f"{len(history.increments)} of {history.planned} increments"
+            mark_unfinished(figure.axes[0], done, history.unfinished and f"the last: {history.unfinished}")
     return figure
 
 

@@ -97,11 +97,19 @@ def mark_states(ax: Axes, status: Sequence[str], x: Floats, y: Floats) -> None:
             ax.plot(x[here], y[here], marker, label=name, **look)
 
 
-def mark_unfinished(ax: Axes, outcome: str) -> None:
-    """A mark across the axes: the run did not converge."""
+def mark_unfinished(ax: Axes, outcome: str, shown: str = "") -> None:
+    """A mark across the axes: the run did not converge, and what is shown is not a solution."""
     box = {"facecolor": "white", "edgecolor": "#A00000", "linewidth": 1.5}
-    words = f"not converged ({outcome})"
-    ax.text(0.5, 0.5, words, color="#A00000", weight="bold", size=12, ha="center", transform=ax.transAxes, bbox=box)
+    look: Any = {
+        "color": "#A00000",
+        "ha": "center",
+        "xycoords": "axes fraction",
+        "textcoords": "offset points",
+        "bbox": box,
+    }
+    ax.annotate(f"not converged ({outcome})", (0.5, 0.5), (0, 0), weight="bold", size=12, **look)
+    if shown:
+        ax.annotate(shown, (0.5, 0.5), (0, -20), **look)
 
 
 def plain(text: str) -> str:

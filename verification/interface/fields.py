@@ -145,6 +145,16 @@ class ContactFields(Value):
         return {name: self.status.count(name) for name in ("stick", "slip", "open")}
 
     @property
+    def apart(self) -> bool:
+        """True if nothing touches."""
+        return set(self.status) == {"open"}
+
+    def warnings(self, length: str) -> list[str]:
+        """Return a warning where nothing touches, with the unit of length."""
+        far = f"the bodies stay apart along Gamma_c, by at least {float(self.gap.min()):.3g} {length}"
+        return [f"nothing touches: {far}"] if self.apart else []
+
+    @property
     def force(self) -> dict[str, float]:
         """Total normal (compressive) and tangential (on body 2) force per unit thickness."""
         return {"normal": float(self.pressure @ self.weights), "tangential": float(self.shear @ self.weights)}

@@ -8,6 +8,7 @@ from itertools import groupby
 from verification.history import History
 from verification.sections.numbers import NONE, count, figures, near_one
 from verification.sections.parts import Cell, Note, Quantity, Sections, Shown, following, of, section, table
+from verification.sections.run import then, unfinished
 from verification.sections.setting import limits, setting
 
 #: What the table of a history shows.
@@ -28,12 +29,11 @@ def sections(found: History) -> Sections:
     """The sections."""
     first = found.increments[0].result
     nodes = sum(len(body.mesh.points) for body in first.bodies.elastic)
-    then = following("march", "-o", "results") if found.converged else following("run", iteration=True)
     return (
         setting(found.problem, nodes, len(found.increments[0].contact.x)),
         section("history", "WHAT HAPPENED", *_happened(found), caption=STEPS, pictures=PICTURES),
         *([section("promise", PROMISE, *_promised(found))] if found.method == "iteration" else []),
-        limits(found.outside, then),
+        limits(found.outside, then(found.increments[-1].result, "march", following("march", "-o", "results"))),
     )
 
 
@@ -67,6 +67,7 @@ def _happened(found: History) -> Iterable[Shown | str]:
         yield f"normal force in {units['stress']} (per unit area)"
     if found.ended:
         yield Note(f"{found.ended}.", lead="Not whole:")
+        yield from unfinished(found.increments[-1].result)
 
 
 def _range(numbers: Sequence[int | None]) -> Cell:

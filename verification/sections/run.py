@@ -13,6 +13,7 @@ from verification.sections.numbers import NONE, count, figures, near_one
 from verification.sections.parts import (
     Cell,
     Labelled,
+    Next,
     Note,
     Quantity,
     Section,
@@ -49,8 +50,25 @@ def sections(finished: Run) -> Sections:
     return (
         setting(finished.problem.with_theta(finished.theta), nodes, finished.pair.contact.grid.n),
         happened(finished, alone=True),
-        limits(finished.outside, following("compare", iteration=True)),
+        limits(finished.outside, then(finished, "run", following("compare", iteration=True))),
     )
+
+
+def then(finished: Run | Solution, command: str, otherwise: Next) -> Next:
+    """The command to type next: where a run did not converge, a command with the change that may let it."""
+    if isinstance(finished, Solution) or not finished.unfinished:
+        return otherwise
+    return following(command, *(() if finished.remedy is None else finished.remedy.options), iteration=True)
+
+
+def unfinished(finished: Run | Solution) -> list[Shown]:
+    """The head of values that do not solve the problem, with the change to try, which a command reports on stderr."""
+    if isinstance(finished, Solution) or not finished.unfinished:
+        return []
+    head = Note("", lead=f"{finished.unfinished.capitalize()}:")
+    if finished.remedy is None:
+        return [head]
+    return [head, *(Note(f"{finished.remedy.sentence()}.", only=place) for place in ("notebook", "report"))]
 
 
 def happened(finished: Run, *, alone: bool) -> Section:
@@ -88,6 +106,7 @@ def happened(finished: Run, *, alone: bool) -> Section:
         chosen = f"theta = {float(finished.theta):.4g} is the {finished.choice.source} one"
         parts.append(f"{chosen}: {finished.choice.why}")
     parts += _grids(problem, finished.pair.contact_body, finished.pair.interface)
+    parts += unfinished(finished)
     parts += _contact(problem, finished.contact, f"; KKT residual of step II {finished.last.contact.kkt.residual:.1e}")
     parts.append(Note(_at_the_end(finished), only="report"))
     return section("run", "WHAT HAPPENED", *parts, caption=RATES, pictures=PICTURES)
@@ -145,7 +164,8 @@ def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list
     states = contact.pattern
     if not problem.contact.friction:
         states = {"closed": states["stick"] + states["slip"], "open": states["open"]}
-    nodes = Labelled("nodes", ", ".join(f"{number} {name}" for name, number in states.items()))
+    counts = ", ".join(f"{number} {name}" for name, number in states.items())
+    nodes = Labelled("nodes", f"{counts}: nothing touches" if contact.apart else counts)
     if problem.dimension == 1:
         return [nodes, Labelled("force", f"{normal}, {units['stress']}{solved}")]
     rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
