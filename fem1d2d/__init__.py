@@ -17,7 +17,7 @@ from fem1d2d.condense import (
 from fem1d2d.element import largest_strains, stresses, von_mises
 from fem1d2d.line import Line, Seen, smooth
 from fem1d2d.material import Material, bar, plane_strain, plane_stress
-from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
+from fem1d2d.mesh import Mesh, MeshError, crossed, interval, rectangle, rectangle_points, sector
 from fem1d2d.mesh_files import from_file
 from fem1d2d.outline import depths
 from fem1d2d.pencil import Eigenvalue, Extremes, extremes_by_solves, largest, largest_of, largest_sparse
@@ -40,6 +40,7 @@ __all__ = [
     "Uncoupled",
     "bar",
     "body_load",
+    "crossed",
     "depths",
     "elimination_order",
     "extremes_by_solves",

@@ -241,6 +241,27 @@ def measures(points: NDArray[Any], cells: Ints) -> NDArray[Any]:
     return np.asarray(sum(others, start=first))
 
 
+def crossed(mesh: Mesh) -> bool:
+    """True if all cells are quadrilaterals split by both diagonals: such triangles do not lock near nu = 1/2.
+
+    Each has then one corner inside the body at which four triangles meet.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> around = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    >>> four = Mesh(points=np.vstack([square, [[0.5, 0.5]]]), cells=around, sides={})
+    >>> crossed(four), crossed(rectangle((0.0, 2.0), (0.0, 2.0), (2, 2)))
+    (True, False)
+    """
+    if mesh.cells.shape[1] != 3:
+        return False
+    middle = np.bincount(mesh.cells.ravel()) == 4
+    middle[mesh.boundary] = False
+    return bool((middle[mesh.cells].sum(axis=1) == 1).all())
+
+
 def _grid(ends: Sequence[Any], cells: int) -> NDArray[Any]:
     a, b = ends
     if cells < 1:

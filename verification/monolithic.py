@@ -98,7 +98,7 @@ class Solution(Document):
     @cached_property
     def checks(self) -> Checks:
         """Checks of the bodies outside Gamma_c, and of their strains."""
-        return check_state(self.bodies, lambda: self.displacements)
+        return check_state(self.bodies, lambda: self.displacements, lambda: self.contact)
 
     @property
     def warnings(self) -> list[str]:

@@ -5,16 +5,18 @@ import math
 import signal
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from problem_list import SMALL, edited
 from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
-from verification.bounds import bound
+from verification.bounds import bound as base
 from verification.bounds import region as plane
-from verification.bounds.bound import NotComputed
-from verification.bounds.table import SemidefiniteBound
+from verification.bounds.bound import NotComputed, Subject
+from verification.bounds.multipliers import QuadraticForms
+from verification.bounds.table import BOUNDS, SemidefiniteBound
 from verification.cli.problems import examples
 from verification.sweeps import workers
 
@@ -81,7 +83,9 @@ def test_the_screen_of_region_counts_runs_and_gives_each_edition_its_line(region
     assert any(f"{outcomes.count('converged')} converged" in line for line in lines)
     assert any("still falling when stopped after" in line for line in lines)
     head = next(i for i, line in enumerate(lines) if "every small theta: k <" in line and "some theta: k <" in line)
-    assert [line.split()[0] for line in lines[head + 1 : head + 5]] == ["printed", "repaired", "energy", "lmi"]
+    rows = [line.split() for line in lines[head + 1 : head + 5]]
+    assert [row[0] for row in rows] == ["printed", "repaired", "energy", "lmi"]
+    assert all(float(every) <= float(some) for _, every, some, _ in rows)  # where every small theta does, some does
     assert "stresses in MPa" in lines[head + 5]
     assert lines[-1].endswith("plane.svg")
     assert [line for line in lines[:-1] if len(line) > 80] == []
@@ -141,6 +145,25 @@ def test_what_the_theorem_in_energy_norms_contracts_the_semidefinite_bound_does(
         assert inner is None or low <= inner[0] < inner[1] <= high * (1 + 1e-9)
     for k, (_, high) in zip(energy.k, energy.theta, strict=True):  # the border falls as friction grows
         assert high <= max((h for q, (_, h) in zip(lmi.k, lmi.theta, strict=True) if q <= k), default=1.0) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("neumann_body", ["1", *["2"] * AT_NIGHT])
+def test_a_border_is_off_by_at_most_1_percent_between_its_frictions_too(write, neumann_body):
+    pair = vf.build(vf.load(write(COARSE | {"iteration.neumann_body": neumann_body})))
+    measured, random = vf.measure(pair), np.random.default_rng(1)
+    subject = Subject.of(pair, measured)
+    for name, bound in BOUNDS.items():
+        region = bound.region(subject)
+        line = lambda k, end, region=region: np.interp(k, region.k, [ends[end] for ends in region.theta])
+        for k in region.k[-1] * random.uniform(0.001, 1, 8 if name == "lmi" else 60):
+            if name == "lmi":
+                ends = (0.0, QuadraticForms(pair, measured, friction=k).largest_theta().value)
+            else:
+                ends = bound.evaluate(subject.at(k)).interval
+            for end, theta in enumerate(ends):
+                near = sorted(line(k * share, end) for share in (0.99, 1.0, 1.01))
+                moved = near[0] <= theta <= near[-1] and abs(theta - line(k, end)) <= 0.01
+                assert moved or line(k, end) == pytest.approx(theta, rel=0.01), (name, k)
 
 
 def test_the_border_of_a_region_is_where_contraction_ends(charted):
@@ -231,7 +254,7 @@ def short(monkeypatch, quick):
     def fail(self, subject, progress):
         raise NotComputed("made up")
 
-    monkeypatch.setattr(bound, "TRACED", 4)
+    monkeypatch.setattr(base, "TRACED", 4)
     monkeypatch.setattr(plane, "THETAS", (0.1, 0.5, 0.9))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1, 1.0))
     monkeypatch.setattr(SemidefiniteBound, "region", fail)

@@ -152,6 +152,15 @@ def test_known_values_in_units_of_the_ratio_of_moduli(cells, expected):
     assert found == pytest.approx(expected, rel=2e-7)
 
 
+@pytest.mark.parametrize("nu", [0.2, 0.3, 1 / 3, 0.4, 0.45, 0.49])
+def test_cells_of_one_aspect_add_nothing_for_nu_up_to_a_third_and_beyond_only_if_they_are_wide_enough(nu):
+    expected = {0.4: (2.102, 1.599, 1.4, 1.4), 0.45: (2.954, 2.037, 1.278, 1.2), 0.49: (4.844, 2.690, 1.533, 1.157)}
+    for aspect, rho in zip((0.5, 1.0, 2.0, 4.0), expected.get(nu, [3 - 4 * nu] * 4), strict=True):
+        layer = Layer(material=plane_strain(1.0, nu), aspect=aspect)
+        found = [peak.ratio for peak in peaks(Interface(contact=layer, neumann=layer))]
+        assert found == pytest.approx([rho, 1.0], abs=1e-3)
+
+
 def test_bad_layers_are_refused():
     for values in ({"aspect": 0.0}, {"aspect": float("nan")}, {"aspect": 1.0, "rows": 0}):
         with pytest.raises(MeshError):

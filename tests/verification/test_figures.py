@@ -177,6 +177,15 @@ def plane():
     return Plane(title="all", regions=regions, points=tuple(points), reason={}, units={"length": "mm", "stress": "MPa"})
 
 
+def test_the_border_of_a_region_is_a_line_between_two_frictions_on_linear_and_on_logarithmic_axes(plane):
+    for ax in plane.plot().axes:
+        drawn = [c for c in ax.collections if isinstance(c, PolyCollection)]
+        for each, region in zip(drawn, reversed([plane.regions[name] for name in BOUNDS]), strict=True):
+            outline, middle = each.get_paths()[0].transformed(ax.transScale), 0.75 * region.k[-1]
+            covers = lambda theta, at=outline, k=middle, ax=ax: at.contains_point(ax.transScale.transform((theta, k)))
+            assert [covers(theta) for theta in (0.149, 0.151, 0.849, 0.851)] == [False, True, True, False]
+
+
 def test_regions_are_told_apart_in_grey_print_and_their_hatches_seen(plane):
     drawn = [c for c in plane.plot().axes[0].collections if isinstance(c, PolyCollection)]
     assert len(drawn) == len(BOUNDS)

@@ -5,11 +5,13 @@ import os
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
-from mesh_writer import read_here
+from mesh_writer import read_here, write_gmsh22
 
 import verification as vf
 from fem1d2d import mesh_files
+from verification.interface.assembly import discretise
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 RECORD = json.loads((BENCHMARKS / "records" / "advice" / "gallery.json").read_text("utf-8"))["rows"]
@@ -52,3 +54,36 @@ def test_a_false_answer_would_be_noticed(gallery, tmp_path):
     entry = gallery["press-fit"]
     problem = entry.make(tmp_path, 12)
     assert entry.error(problem.changed(young=(1e5, 2e5)), vf.solve(problem).contact) > 10 * entry.allowed
+
+
+def delaunay(path, corners):
+    """Irregular nodes inside, and of each quadrilateral the diagonal that Delaunay's triangulation has."""
+    points, node = corners.copy(), np.arange(corners[..., 0].size).reshape(corners.shape[:2])
+    wide, high = np.diff(corners[..., 0], axis=0)[:, 1:-1], np.diff(corners[..., 1], axis=1)[1:-1]
+    room = np.minimum(np.minimum(wide[:-1], wide[1:]), np.minimum(high[:, :-1], high[:, 1:]))
+    points[1:-1, 1:-1] += room[..., None] * np.random.default_rng(0).uniform(-0.25, 0.25, (*room.shape, 2))
+    ends = [node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]]
+    a, b, c, d = ((points[..., 0] + 1j * points[..., 1]).ravel()[end] for end in ends)
+    first = (((a - b) / (c - b) * (c - d) / (a - d)).imag >= 0)[..., None]  # opposite angles of at most 180 degrees
+    a, b, c, d = ends
+    of = lambda *three: np.stack(three, axis=-1)
+    cells = np.concatenate([np.where(first, of(a, b, c), of(a, b, d)), np.where(first, of(a, c, d), of(b, c, d))])
+    lines = {"left": node[0], "right": node[-1], "bottom": node[:, 0], "top": node[:, -1]}
+    sides = {name: np.column_stack([line[:-1], line[1:]]) for name, line in lines.items()}
+    write_gmsh22(path, points.reshape(-1, 2), cells.reshape(-1, 3), sides)
+
+
+def test_near_nu_of_one_half_hertz_is_off_and_warned_of_unless_cells_are_split_by_both_diagonals(
+    gallery, monkeypatch, tmp_path
+):
+    entry, cells = gallery["cylinder-on-plane-2"], 24 if NIGHT else 6
+    monkeypatch.setattr("gallery.POISSON", 0.475)
+    errors, warned = [], []
+    for write in (None, delaunay):
+        if write:
+            monkeypatch.setattr("gallery.write_mesh", write)
+        problem = entry.make(tmp_path, cells)
+        warned.append("body1.poisson = 0.475" in " ".join(discretise(problem).warnings))
+        errors.append(entry.error(problem, vf.solve(problem).contact))
+    assert warned == [False, True]
+    assert errors[0] < 0.01 < 0.1 < errors[1]

@@ -78,6 +78,24 @@ def test_nothing_is_suggested_where_long_waves_or_the_ends_decide_or_cells_have_
     assert suggest(vf.example("section6"), LOW, normal=False).cells is None
 
 
+def test_cells_wider_than_high_are_suggested_where_nu_is_above_a_third_and_have_the_smaller_rho_on_fine_meshes():
+    square = lambda nu, **changes: vf.example("section6").changed(poisson=(nu, nu), **changes)
+    found = suggest(square("0.4"), LOW, normal=False)
+    assert found.cells == ((40, 12), (24, 12))
+    assert found.found.numbers["rho_cells"].value == pytest.approx(2 / 7 * 1.4)  # that of half-planes without cells
+    better = square("0.4", cells=found.cells)
+    own, other = (vf.measure(problem).rho_max.value for problem in (square("0.4"), better))
+    assert own > 1.15 * other
+    assert suggest(square("1/3"), LOW, normal=False).cells is None
+    stress = square("0.4").to_dict() | {"plane": "stress"}  # as bodies of plane strain with nu = 2/7
+    assert suggest(vf.Problem.from_dict(stress), LOW, normal=False).cells is None
+
+
+def test_the_screen_names_nu_where_it_asks_for_cells_wider_than_high():
+    said = str(vf.advise(vf.example("section6").changed(poisson=("0.4", "0.4"))).sections())
+    assert "with cells [40, 12], [24, 12] fine meshes have rho >= 0.400, not >= 0.457 (nu = 0.4 > 1/3)" in said
+
+
 def test_a_role_that_is_refused_has_neither_and_the_reason():
     sliding = blocks(
         cells=((16, 4), (8, 2)), body2={"prescribed": {"top": ["free", "-0.01"]}}, iteration={"neumann_body": 2}

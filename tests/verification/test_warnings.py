@@ -1,6 +1,7 @@
 """Warnings: what linear triangles cannot do near nu = 1/2, and what the kernel of the friction law does to friction."""
 
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,13 +29,13 @@ def warned(data):
     ("lower", "upper", "named"),
     [
         ("0.3", "0.3", None),
-        ("0.479", "0.47", None),
-        ("0.48", "0.3", "body1.poisson = 0.48"),
+        ("0.449", "0.44", None),
+        ("0.45", "0.3", "body1.poisson = 0.45"),
         ("0.3", "0.4999", "body2.poisson = 0.4999"),
         ("0.49", "0.499", "body1.poisson = 0.49 and body2.poisson = 0.499"),
     ],
 )
-def test_a_poisson_ratio_of_048_or_more_is_warned_of_by_its_key(lower, upper, named):
+def test_a_poisson_ratio_of_045_or_more_is_warned_of_by_its_key(lower, upper, named):
     warnings = warned(plates(body1={"poisson": lower}, body2={"poisson": upper}))
     assert warnings == [] if named is None else warnings[0].startswith(f"{named}: near 1/2 linear triangles ")
     assert len(warnings) == (named is not None)
@@ -53,6 +54,15 @@ def split(path, x, y, cells, both):
     triangles = np.concatenate([np.column_stack(three) for three in corners])
     write_gmsh22(path, points, triangles, mesh.sides)
     return str(path)
+
+
+def test_near_one_half_nothing_is_warned_of_where_all_cells_are_split_by_both_diagonals(tmp_path):
+    data = plates(body1={"poisson": "0.49"}, body2={"poisson": "0.3"})
+    for key in ("shape", "x", "y", "cells"):
+        del data["body1"][key]
+    for both in (True, False):
+        data["body1"]["mesh"] = split(tmp_path / f"{both}.msh", (0.0, 2.0), (-0.3, 0.0), (20, 3), both)
+        assert warned(data) == [] if both else "split by both diagonals" in warned(data)[0]
 
 
 def test_near_one_half_one_diagonal_multiplies_the_force_and_both_diagonals_do_not_lock(tmp_path):
@@ -146,6 +156,67 @@ def test_a_radius_between_one_and_two_cells_that_adds_a_tenth_is_warned_of():
     (warning,) = warned(fine)
     assert "contact.radius = 0.0133333 is no multiple of the mesh width 0.01" in warning
     assert "by about 1.12" in warning
+
+
+# --- the local law on grids that differ -------------------------------------------------------------------------------
+
+
+def tipping(law, cells=(14, 2), push="0.1", **more):
+    """A soft block whose top is pushed aside until it slides on its edge, and its columns and those of the plate."""
+    plate = {"shape": "rectangle", "x": [0, 2], "y": [-1, 0], "cells": [cells[0], 7], "young": 1000, "poisson": "0.3"}
+    block = {"shape": "rectangle", "x": ["0.5", "1.5"], "y": [0, 1], "cells": [cells[1], 2], "young": 100}
+    top = {"poisson": "0.3", "prescribed": {"top": [push, "-0.002"]}}
+    contact = {"friction": "0.8", "law": law, **more}
+    iteration = {"neumann_body": 1, "theta": "0.5", "tolerance": 1e-9, "max_iterations": 500}
+    bodies = {"title": "a block", "body1": plate | {"fixed": ["bottom"]}, "body2": block | top}
+    return vf.Problem.from_dict(bodies | {"contact": contact, "iteration": iteration})
+
+
+def of_the_bound(result):
+    return [text for text in result.warnings if text.startswith("contact") and "closed nodes" in text]
+
+
+def test_a_bound_that_is_not_coulombs_is_warned_of_with_its_range_and_coulombs_friction_is_not():
+    carried = {}
+    for law in ("local", "local-contact"):
+        found = vf.solve(tipping(law))
+        force, closed = found.contact.force, found.contact.pressure > 0
+        carried[law] = abs(force["tangential"]) / (0.8 * force["normal"])
+        ratios = found.contact.bound[closed] / (0.8 * found.contact.pressure[closed])
+        assert force["normal"] > 0.1
+        if law == "local":
+            (text,) = of_the_bound(found)
+            assert f"is {ratios.min():.2g} to {ratios.max():.2g} times k times their pressure" in text
+            assert 'law = "local-contact"' in text
+            assert "one grid on both sides" in text
+        else:
+            assert of_the_bound(found) == []
+            assert ratios == pytest.approx(1)
+    assert carried["local-contact"] == pytest.approx(1)
+    assert carried["local"] > 2
+
+
+def test_a_run_that_converged_says_the_same_as_the_solution():
+    run, solution = vf.run(tipping("local", push="0.01")), vf.solve(tipping("local", push="0.01"))
+    assert run.converged
+    assert of_the_bound(run) == of_the_bound(solution) != []
+
+
+@pytest.mark.parametrize(
+    ("law", "cells", "more"), [("local", (16, 8), {}), ("nonlocal", (14, 2), {"radius": "0.2"})], ids=["one grid", "S"]
+)
+def test_no_such_warning_on_one_grid_nor_for_another_law(law, cells, more):
+    assert of_the_bound(vf.solve(tipping(law, cells, **more))) == []
+
+
+def test_of_several_lines_the_one_with_the_law_is_named():
+    stack = tomllib.loads(examples()["stack"])
+    stack["body3"]["cells"] = [6, 4]
+    stack["contact"][1] = {**stack["contact"][1], "law": "local"}
+    del stack["contact"][1]["radius"]
+    (text,) = of_the_bound(vf.solve(vf.Problem.from_dict(stack)))
+    assert text.startswith("contact[2].law")
+    assert text.endswith("needed one grid on both sides of Gamma_c")  # no line of several takes "local-contact"
 
 
 # --- what the page and the built-in files say -------------------------------------------------------------------------

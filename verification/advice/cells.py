@@ -1,4 +1,8 @@
-"""Cells that make rho smaller: both bodies in cells of one shape, whose diagonals mirror each other across Gamma_c."""
+"""Cells that make rho smaller: both bodies in cells of one shape, whose diagonals mirror each other across Gamma_c.
+
+For nu up to about 1/3 short waves of such cells add nothing to rho, whatever their shape; for a larger nu, of plane
+strain, they do unless the cells are wider than high.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +25,10 @@ MOST_GROWTH = 2
 #: Other cells must make rho smaller by this share to be preferred to those found first.
 SAME = 0.001
 
+#: Above this nu of plane strain cells that are wider than high are tried, with so many times the rows.
+NARROW = Fraction(1, 3)
+WIDE = (2, 4)
+
 Counts = tuple[int, int]
 
 
@@ -36,12 +44,15 @@ class Suggested:
         ``rho_cells`` and ``rho_normal_cells`` of the file's cells and of the suggested ones, in the file's roles.
     normal : bool
         True if ``rho_normal_cells`` decides.
+    poisson : Fraction
+        The larger nu of both bodies, of plane strain with the same law in the plane.
     why : str
         Why there are none.
     """
 
     of_file: OfCells
     normal: bool
+    poisson: Fraction = Fraction(0)
     cells: tuple[Counts, Counts] | None = None
     found: OfCells | None = None
     why: str = ""
@@ -87,7 +98,8 @@ def suggest(problem: Problem, rho: Number, *, normal: bool) -> Suggested:
     own = rho_of_cells(problem)
     if not own.numbers:
         return no_cells(own.why)
-    none = Suggested(of_file=own, normal=normal)
+    poisson = max(body.moduli.poisson for body in (problem.body1, problem.body2))
+    none = Suggested(of_file=own, normal=normal, poisson=poisson)
     value = none.value(own).value
     if rho.value > (1 + GAIN) * value:
         return replace(none, why="rho is larger than rho of the cells: long waves or the ends of Gamma_c decide")
@@ -95,15 +107,19 @@ def suggest(problem: Problem, rho: Number, *, normal: bool) -> Suggested:
         return replace(none, why="parts of sides need nodes at their ends")
     best = replace(none, why=f"rho is at most {GAIN:.0%} larger than with cells of one shape that mirror each other")
     least = value / (1 + GAIN)
-    for cells in dict.fromkeys(_of_one_shape(problem)):
+    rows = (1, *WIDE) if poisson > NARROW else (1,)
+    for cells in dict.fromkeys(cells for times in rows for cells in _of_one_shape(problem, times)):
         found = rho_of_cells(problem.changed(cells=cells))
         if found.numbers and none.value(found).value < least:
             best, least = replace(none, cells=cells, found=found), none.value(found).value * (1 - SAME)
     return best
 
 
-def _of_one_shape(problem: Problem) -> Iterator[tuple[Counts, Counts]]:
-    """Cells of one shape with common nodes, as near to those of one body or the other as these nodes allow."""
+def _of_one_shape(problem: Problem, times: int) -> Iterator[tuple[Counts, Counts]]:
+    """Cells of one shape with common nodes, as near to those of one body or the other as these nodes allow.
+
+    With so many times the rows.
+    """
     counts, widths, heights, left = [], [], [], []
     for body in (problem.body1, problem.body2):
         assert body.x is not None
@@ -119,7 +135,7 @@ def _of_one_shape(problem: Problem) -> Iterator[tuple[Counts, Counts]]:
     for (columns, _), width in zip(counts, widths, strict=True):
         a = common / max(1, round(common * columns / width))
         for (_, own), height in zip(counts, heights, strict=True):
-            rows = round(heights[0] * own / height)
+            rows = round(times * heights[0] * own / height)
             rows = max(1, rows + (rows + int(apart / a)) % 2)  # the diagonals of this mesh mirror, too
             found = (int(widths[0] / a), rows), (int(widths[1] / a), max(1, round(heights[1] * rows / heights[0])))
             if sum(n * m for n, m in found) <= most:

@@ -254,7 +254,7 @@ class Run(Document):
     def checks(self) -> Checks:
         """Checks of the bodies outside Gamma_c and of their strains, at the last iterate."""
         why = "the run diverged" if self.outcome == "diverged" else ""
-        return check_state(self.pair, lambda: self.displacements, why)
+        return check_state(self.pair, lambda: self.displacements, lambda: self.contact, why)
 
     @property
     def history(self) -> list[float]:

@@ -6,10 +6,13 @@ Every bound, from the printed theorem to the semidefinite program, derives from 
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from heapq import heappop, heappush
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
@@ -23,8 +26,17 @@ if TYPE_CHECKING:
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
 
-#: How many friction values trace the border of a region.
+#: The thetas between two values.
+Ends = tuple[float, float]
+
+#: Friction values that trace the border of a region, at most.
 TRACED = 60
+
+#: Between two of them the border is a straight line if that misses it by at most this share.
+MISSED = 8e-3
+
+#: The shares of the largest friction at which tracing begins.
+FIRST = (1.0, 0.75, 0.5, 0.25, 1e-4)
 
 #: Why a bound that was left out has no result.
 NOT_ASKED = "not asked for"
@@ -207,7 +219,7 @@ class Region:
     Attributes
     ----------
     k : tuple of float
-        Friction, increasing; below the first value the region does not shrink.
+        Friction, increasing; below the first value the region does not shrink, and between two the border is a line.
     theta : tuple of pairs of float
         Contraction for lo < theta < hi.
     every, some : float, float or None
@@ -215,7 +227,7 @@ class Region:
     """
 
     k: tuple[float, ...]
-    theta: tuple[tuple[float, float], ...]
+    theta: tuple[Ends, ...]
     every: float
     some: float | None
 
@@ -284,8 +296,9 @@ class Bound(ABC):
         found = self.evaluate(subject)
         if found.friction.some is None or found.friction.every is None:
             raise NotComputed(found.not_computed or "needed a law of friction to vary k")
-        interval = lambda k: self.evaluate(subject.at(k)).interval
-        return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
+        some = found.friction.some.value
+        k, theta = trace(lambda k: self.evaluate(subject.at(k)).interval, some * (1 - 1e-6), TRACED)
+        return Region(k=k, theta=theta, every=found.friction.every.value, some=some)
 
     def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
         """Remarks to print beside figures of this bound (beside a region ``result`` is None), in a unit of stress."""
@@ -321,15 +334,43 @@ def bounded(results: Iterable[BoundResult]) -> str:
     return next((result.friction.on for result in results if result.friction.on in ("k", "C_K")), "k")
 
 
-def trace(interval: Callable[[float], tuple[float, float] | None], *, every: float, some: float) -> Region:
-    """Follow the border of a region up to the last friction that allows some theta, closer where it ends."""
-    import numpy as np
+def trace(
+    interval: Callable[[float], Ends | None], last: float, most: int
+) -> tuple[tuple[float, ...], tuple[Ends, ...]]:
+    """Follow the border of a region up to a friction by straight lines, at most so many: halved where one misses it.
 
-    ks = [some * (1 - 10.0**exponent) for exponent in np.linspace(-0.05, -6, TRACED // 2)]
-    ks = sorted({*np.geomspace(some * 1e-3, some * 0.1, TRACED - TRACED // 2), *ks})
-    found = [(float(k), interval(float(k))) for k in ks]
-    kept = [(k, ends) for k, ends in found if ends is not None]
-    return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept), every=every, some=some)
+    Returns the frictions, and the interval of theta at each.
+    """
+    ks = [last * share for share in FIRST]
+    found = {k: interval(k) for k in ks}
+    most_theta = max((high for _, high in filter(None, found.values())), default=1.0)
+    lines = [(-math.inf, high, low) for high, low in pairwise(ks)]
+    while lines and len(found) < most:
+        _, high, low = heappop(lines)
+        k = (low + high) / 2
+        found[k] = interval(k)
+        missed = _missed(found[low], found[k], found[high], (high - low) / k, most_theta)
+        if missed > MISSED and high - low > MISSED * high:
+            heappush(lines, (-missed, high, k))
+            heappush(lines, (-missed, k, low))
+    kept = {k: ends for k, ends in sorted(found.items()) if ends is not None}
+    return tuple(kept), tuple(kept.values())
+
+
+def _missed(low: Ends | None, middle: Ends | None, high: Ends | None, width: float, most_theta: float) -> float:
+    """The share by which a line between two frictions misses the border halfway.
+
+    Of theta; where theta is small or the border steep, of k and of the largest theta.
+    """
+    if low is None or middle is None or high is None:
+        return math.inf
+    missed = 0.0
+    for left, at, right in zip(low, middle, high, strict=True):
+        off = abs(at - (left + right) / 2)
+        if off:
+            of_k = off * width / abs(right - left) if left != right else math.inf
+            missed = max(missed, min(off / at if at else math.inf, max(off / most_theta, of_k)))
+    return missed
 
 
 class Removed(Bound):

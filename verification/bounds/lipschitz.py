@@ -438,9 +438,11 @@ def work_out(
 
 
 def thetas(
-    pair: ContactPair, measured: Measured, count: int, *, progress: Progress = silent
-) -> tuple[float, list[tuple[float, float]]]:
-    """The largest friction that is allowed, and so many values up to it with the largest theta at each.
+    pair: ContactPair, measured: Measured, *, progress: Progress = silent
+) -> tuple[float, Callable[[float], float | None]]:
+    """The largest friction that is allowed, and the function that finds the largest theta at a friction below.
+
+    What it found at a larger friction it starts from, and proves here, too: the conditions grow with k.
 
     Raises
     ------
@@ -451,15 +453,18 @@ def thetas(
     if measured.friction_threshold is None:
         raise ValueError(measured.why_no_threshold)
     last = friction_threshold(pair, measured, measured.friction_threshold.value, progress=progress)
-    kept: list[tuple[float, float]] = []
-    near = None
-    for done, k in enumerate(last * np.arange(count, 0, -1) / count):
-        progress(f"semidefinite bound: largest theta at k = {k:.3g}", done / count)
-        if kept and kept[-1][1] == 1:  # its multipliers prove the same below: the conditions grow with k
-            kept.append((float(k), 1.0))
-            continue
-        found = QuadraticForms(pair, measured, friction=float(k)).largest_theta(near)
-        if found is not None:
-            kept.append((float(k), found.value))
-            near = found.early
-    return last, kept[::-1]
+    found: dict[float, Certified | None] = {}
+
+    def largest(k: float) -> float | None:
+        above = found.get(min((other for other in found if other > k), default=k))
+        here = above
+        if above is None or above.value < 1:
+            progress(f"semidefinite bound: largest theta at k = {k:.3g}", None)
+            forms = QuadraticForms(pair, measured, friction=k)
+            here = forms.largest_theta(None if above is None else above.early)
+            if above is not None and (here is None or here.value < above.value):
+                here = replace(above, early=None)
+        found[k] = here
+        return None if here is None else here.value
+
+    return last, largest

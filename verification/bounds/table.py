@@ -13,7 +13,7 @@ from ndtheory.constants import relaxation_factor
 from ndtheory.number import Numeric, below, weakest
 from ndtheory.texts import did_you_mean
 from verification.bounds import LARGEST
-from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Removed, Subject, Thresholds
+from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Removed, Subject, Thresholds, trace
 from verification.document import Document
 from verification.progress import Progress, silent
 from verification.value import to_plain
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
 
-#: Number of friction values that trace the border of the region of the semidefinite bound.
-TRACED = 12
+#: Friction values that trace the border of the region of the semidefinite bound, at most.
+TRACED = 25
 
 #: The constants that may be given to the calculator, for Section 5 and for the theorem in energy norms.
 SECTION_5, ENERGY = ("m", "M", "C_R", "C_s", "C_tr", "k", "C_K"), ("rho", "kappa_1", "kappa_2")
@@ -206,10 +206,12 @@ class SemidefiniteBound(Bound):
         if pair.contact.grid.n > LARGEST:
             raise NotComputed(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
         try:
-            last, kept = thetas(pair, measured, TRACED, progress=progress)
+            last, largest = thetas(pair, measured, progress=progress)
+            interval = lambda k: None if (end := largest(k)) is None else (0.0, end)
+            k, theta = trace(interval, last, TRACED)
         except (LMIError, ValueError) as error:
             raise NotComputed(str(error)) from None
-        return Region(k=tuple(k for k, _ in kept), theta=tuple((0.0, end) for _, end in kept), every=last, some=None)
+        return Region(k=k, theta=theta, every=last, some=last)
 
 
 def _why_not(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -14,13 +15,15 @@ from verification.figures.style import OUTCOMES, THETA, ink, legend_beside, new_
 #: The enlarged part ends this much above the largest friction of which something is proved.
 ROOM = 1.3
 
+#: Number of points of a border on logarithmic axes.
+DENSE = 200
+
 
 def draw_region(plane: Plane) -> Figure:
     """Regions in which contraction is proved, from the largest to the smallest, and the outcome of each run.
 
     Above, all of the plane on logarithmic axes; below, on linear ones, the part in which something is proved.
-    Between two computed frictions the thetas of the larger one are shown: what is proved there is proved for less
-    friction, too.
+    Between two computed frictions the border is a straight line on linear axes.
     """
     ends = [hi for region in plane.regions.values() for _, hi in region.theta]
     frictions = [k for region in plane.regions.values() for k in region.k]
@@ -31,8 +34,8 @@ def draw_region(plane: Plane) -> Figure:
         figure = new_figure(7.2, 7.2)
         whole, enlarged = figure.subplots(2, 1)
         whole.set(xscale="log", yscale="log")
-        for ax, least in ((whole, (left, bottom)), (enlarged, (0.0, 0.0))):
-            _draw(ax, plane, *least)
+        for ax in (whole, enlarged):
+            _draw(ax, plane, left, bottom)
             ax.set(ylabel=f"{'largest ' * varies}coefficient of friction k")
         whole.set(xlim=(left, 1.3), ylim=(bottom, 2 * highest))
         enlarged.set(xlim=(0, 1), ylim=(0, ROOM * max(frictions)), xlabel=THETA)
@@ -47,13 +50,13 @@ def _draw(ax: Axes, plane: Plane, left: float, bottom: float) -> None:
         region = plane.regions.get(name)
         if region is None or not region.k:
             continue
-        k = [bottom, *region.k]
-        low = [max(lo, left) for lo, _ in (region.theta[0], *region.theta)]
-        high = [hi for _, hi in (region.theta[0], *region.theta)]
+        # closer than computed: a line on linear axes is none on logarithmic ones
+        k = np.unique([bottom, *region.k, *np.geomspace(region.k[0], region.k[-1], DENSE)])
+        low, high = (np.interp(k, region.k, ends) for ends in zip(*region.theta, strict=True))
         unit = f" ({plain(plane.units['stress'])})" if bound.of_unit else ""
         fill = bound.fill or bound.colour
         look: dict[str, Any] = {"facecolor": fill, "edgecolor": ink(fill), "linewidth": 0, "hatch": bound.hatch}
-        ax.fill_betweenx(k, low, high, step="pre", label=f"{name}{unit}: k < {max(region.k):.2g}", **look)
+        ax.fill_betweenx(k, np.maximum(low, left), high, label=f"{name}{unit}: k < {max(region.k):.2g}", **look)
     for outcome, (colour, marker) in OUTCOMES.items():
         chosen = [point for point in plane.points if point.outcome == outcome]
         if chosen:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import permutations
 from typing import Any
 
@@ -14,6 +14,7 @@ from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.interface.assembly import TwoBodies
 from verification.interface.body import Body
+from verification.interface.fields import ContactFields
 from verification.interface.joining import obstacle_level
 from verification.interface.pair import ContactPair
 from verification.problem.specs import BodySpec
@@ -84,7 +85,12 @@ class Checks(Value):
         }
 
 
-def check_state(bodies: TwoBodies | ContactPair, displacements: Callable[[], Displacements], why: str = "") -> Checks:
+def check_state(
+    bodies: TwoBodies | ContactPair,
+    displacements: Callable[[], Displacements],
+    contact: Callable[[], ContactFields],
+    why: str = "",
+) -> Checks:
     """Measure a deformed state.
 
     Parameters
@@ -92,17 +98,27 @@ def check_state(bodies: TwoBodies | ContactPair, displacements: Callable[[], Dis
     displacements : callable
         Returns those of body 1 and of body 2, shape (nodes, d), unit of length; None where rigid.  It is not called
         where nothing is measured.
+    contact : callable
+        Returns what happens along Gamma_c.
     why : str
         Why nothing is to be measured.
     """
-    if isinstance(bodies, ContactPair):
-        if bodies.problem is None:
-            return Checks.without("the pair is made from matrices, without meshes")
-        bodies = bodies.on_meshes()
     if why:
         return Checks.without(why)
-    with one_thread():
-        return _check(bodies, displacements())
+    if isinstance(bodies, ContactPair) and bodies.problem is None:
+        found = Checks.without("the pair is made from matrices, without meshes")
+    else:
+        with one_thread():
+            on_meshes = bodies.on_meshes() if isinstance(bodies, ContactPair) else bodies
+            found = _check(on_meshes, displacements())
+    return replace(found, warnings=(*found.warnings, *_of_the_law(bodies, contact())))
+
+
+def _of_the_law(bodies: TwoBodies | ContactPair, contact: ContactFields) -> list[str]:
+    interface = bodies.interface
+    if interface.law is None or not bodies.friction or interface.contact.dimension == 1:
+        return []
+    return interface.law.warnings_after(interface, float(bodies.friction), contact.pressure, contact.bound)
 
 
 def _check(bodies: TwoBodies, moved: Displacements) -> Checks:

@@ -20,6 +20,12 @@ from verification.value import Value
 #: 0.67 at 1.
 SHARE = 0.1
 
+#: Where a node has less than this part of the largest pressure the law may be far off: it carries next to nothing.
+LITTLE = 1e-3
+
+#: The other way out of friction that is not Coulomb's at the nodes, where there are two bodies.
+OF_TWO = ', or `ndtheory solve` with law = "local-contact", where it is that at each node'
+
 
 def hat(t: Floats, radius: float) -> Floats:
     """Return the kernel ``omega_r(t) = max(0, 1 - |t|/r)/r``, of integral 1, unit 1/length.
@@ -110,6 +116,18 @@ class Local(Law):
     def operator(self, interface: Interface) -> Floats:
         stress = np.diag(1 / interface.neumann.weights)
         return stress if interface.transfer is None else interface.transfer @ stress
+
+    def warnings_after(self, interface: Interface, k: float, pressure: Floats, bound: Floats) -> list[str]:
+        coulomb = k * pressure * (1.0 if interface.shares is None else interface.shares)
+        pressed = (coulomb > LITTLE * coulomb.max(initial=0.0)) & (bound > 0)  # it is 0 where a support stands in
+        ratios = bound[pressed] / coulomb[pressed]
+        if interface.transfer is None or (np.abs(ratios - 1) <= SHARE).all():
+            return []
+        return [
+            'contact.law = "local" on grids that differ: the friction bound of closed nodes is'
+            f" {ratios.min():.2g} to {ratios.max():.2g} times k times their pressure; needed one grid on both sides of"
+            f" Gamma_c{OF_TWO}"
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -166,6 +166,10 @@ class Law(ABC):
         """Return what a user should know before trusting the numbers of this law on these grids."""
         return []
 
+    def warnings_after(self, interface: Interface, k: float, pressure: Floats, bound: Floats) -> list[str]:
+        """Return what a solution shows of this law: its pressure and friction bound at the contact nodes."""
+        return []
+
 
 @dataclass(frozen=True, kw_only=True)
 class Stretch:

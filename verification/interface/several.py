@@ -16,6 +16,7 @@ from scipy.linalg import block_diag
 
 from fem1d2d import Mesh, MeshError, Supports
 from fem1d2d.mesh import Floats, Ints
+from verification.interface.friction import OF_TWO
 from verification.interface.interface import Grid, Interface, Law, Nodes, Stretch
 from verification.interface.joining import check_profile, join
 from verification.problem.specification import Problem
@@ -57,6 +58,14 @@ class Blocks(Value, Law):
         for i, (part, scale) in enumerate(zip(self.parts, self.scales, strict=True), 1):
             texts = part.law.warnings(part) if part.law is not None and scale else []
             found += [text.replace("contact.", f"contact[{i}].", 1) for text in texts]
+        return found
+
+    def warnings_after(self, interface: Interface, k: float, pressure: Floats, bound: Floats) -> list[str]:
+        found = []
+        for i, (line, part, scale) in enumerate(zip(interface.lines, self.parts, self.scales, strict=True), 1):
+            own = line.contact
+            texts = part.law.warnings_after(part, scale * k, pressure[own], bound[own]) if part.law and scale else []
+            found += [text.replace("contact.", f"contact[{i}].", 1).removesuffix(OF_TWO) for text in texts]
         return found
 
 

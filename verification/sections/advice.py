@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from verification.advice import BodyNumber
 from verification.advice.accelerated import Accelerated
-from verification.advice.cells import Suggested
+from verification.advice.cells import NARROW, Suggested
 from verification.advice.methods import NAMES as METHOD_NAMES
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
 from verification.advice.readings import assumed as assumption
@@ -198,8 +198,10 @@ def _cells(found: Advice, role: Role, seen: Suggested) -> str:
     assert seen.found is not None
     lower, upper = ("[{}, {}]".format(*counts) for counts in seen.cells)
     least, own = (figures(seen.value(of)) for of in (seen.found, seen.of_file))
+    wide = f" (nu = {float(seen.poisson):.3g} > {NARROW})" if seen.poisson > NARROW else ""
     return (
-        f"{_name(found, role.neumann_body)}: with cells {lower}, {upper} fine meshes have rho >= {least}, not >= {own}"
+        f"{_name(found, role.neumann_body)}: with cells {lower}, {upper} fine meshes have rho >= {least}, "
+        f"not >= {own}{wide}"
     )
 
 

@@ -91,7 +91,8 @@ def plane(found: Plane, target: Path | None = None) -> Sections:
     for name, region in found.regions.items():
         if region.k:
             highest = figures(max(hi for _, hi in region.theta))
-            rows.append((name, figures(region.every), figures(region.some), highest))
+            some = region.every if region.some is None else region.some  # where every small theta contracts some do
+            rows.append((name, figures(region.every), figures(some), highest))
             notes += named(name).remarks(None, found.units["stress"])
     notes += [f"{name}: {reason}" for name, reason in found.reason.items()]
     lines = table(("bound", "every small theta: k <", "some theta: k <", "theta at most"), rows)

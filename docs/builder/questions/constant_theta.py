@@ -77,9 +77,9 @@ def data() -> dict[str, Any]:
             )
     asked = rho_star(*(HEIGHTS[i] for i in ASKED))
     return widget(
-        question="Two bodies are of one material. The cells of the contact body are twice as high as wide, and the "
-        f"Neumann body has square ones. Without a mesh short waves have the ratio {limit:g}. What does rho do as the "
-        "mesh is halved again and again?",
+        question=f"Two bodies are of one material, with nu = {float(NU):g}. The cells of the contact body are twice as "
+        f"high as wide, and the Neumann body has square ones. Without a mesh short waves have the ratio {limit:g}. "
+        "What does rho do as the mesh is halved again and again?",
         answers=[
             f"it tends to {limit:g}, as without a mesh",
             f"it tends to {asked:.2f} or more",
@@ -87,7 +87,7 @@ def data() -> dict[str, Any]:
         ],
         right=f"it tends to {asked:.2f} or more",
         why=f"the shortest waves have the ratio {asked:.3f} on every mesh of these cells, however fine it is. With "
-        "cells of one shape on both sides long waves decide: move the first slider to 1.",
+        "cells of one shape on both sides long waves decide at this nu: move the first slider to 1.",
         sliders=[
             slider("contact", "height over width, contact body", HEIGHTS, ASKED[0]),
             slider("neumann", "height over width, Neumann body", HEIGHTS, ASKED[1]),
