@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
+from verification.interface.matrices import real_array
 from verification.problem.specs import Profile
 from verification.value import Value, freeze, lent
 
@@ -274,7 +275,8 @@ class Interface(Value):
             return None
         if self.law.of_contact and self.transfer is not None:
             raise ValueError(f"{self.law.words}: no operator on the Neumann grid")
-        return freeze(self.operator(self.law))
+        S = real_array("the operator S", self.operator(self.law), (self.contact.n, self.neumann.n))
+        return freeze(S)
 
     @property
     def shares(self) -> Floats | None:
