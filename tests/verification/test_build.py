@@ -337,3 +337,10 @@ def test_without_friction_matrices_need_no_positions_of_their_nodes():
 def test_what_does_not_fit_is_refused_in_words(changes, why):
     with pytest.raises(ValueError, match=why):
         build(**as_matrices(build(small())) | changes)
+
+
+@pytest.mark.parametrize("given", [None, 3, [], {}])
+def test_what_is_no_problem_is_refused_by_every_function_that_takes_one(given):
+    for take in (vf.solve, vf.run, vf.measure, vf.advise, vf.compare, vf.march, vf.sweep, vf.certify):
+        with pytest.raises(ValueError, match="needed a problem"):
+            take(given)

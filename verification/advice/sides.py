@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import LinearOperator
 
-from fem1d2d import solver_with_inertia
+from fem1d2d import MeshError, solver_with_inertia
 from fem1d2d.mesh import Floats
 from verification.advice import BodyNumber
 from verification.interface.matrices import MOST_ROWS, Stiffness, real_array, size, stiffness
@@ -282,7 +282,7 @@ def _of_sparse(name: str, S: sp.csc_array, inverse: Apply | None) -> tuple[Side,
     if inverse is None:
         try:
             inverse, negative = solver_with_inertia(symmetric)
-        except RuntimeError:  # a pivot is 0
+        except MeshError:  # a pivot is 0
             negative = None
         if negative is None or negative:
             raise ValueError(f"{name} is not positive definite: needed a Schur complement of a stiffness matrix")

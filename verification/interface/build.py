@@ -89,7 +89,7 @@ def build(
     if problem is not None:
         if S1 is not None or S2 is not None:
             raise ValueError("received a problem and matrices: needed one of them")
-        if isinstance(problem, Problem) or Path(problem).suffix != ".npz":
+        if not isinstance(problem, (str, Path)) or Path(problem).suffix != ".npz":
             problem = problem if isinstance(problem, Problem) else load(problem)
             if friction is not None and not _varies(friction):
                 return pairs.pair_from(problem.changed(friction=friction), law=law)
