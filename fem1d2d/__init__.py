@@ -21,7 +21,7 @@ from fem1d2d.mesh import Mesh, MeshError, crossed, interval, rectangle, rectangl
 from fem1d2d.mesh_files import from_file
 from fem1d2d.outline import depths
 from fem1d2d.pencil import Eigenvalue, Extremes, extremes_by_solves, largest, largest_of, largest_sparse
-from fem1d2d.supports import Supports, rigid_motions, supports
+from fem1d2d.supports import Supports, pieces, rigid_motions, supports
 from fem1d2d.trace import facing, mortar, surface, trapezoid
 
 __all__ = [
@@ -54,6 +54,7 @@ __all__ = [
     "largest_sparse",
     "largest_strains",
     "mortar",
+    "pieces",
     "plane_strain",
     "plane_stress",
     "rectangle",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,12 +11,15 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dtrtri
 from scipy.sparse.linalg import spilu, splu, spsolve_triangular
 
-from fem1d2d.mesh import Floats, Ints
+from fem1d2d.mesh import Floats, Ints, MeshError
+
+#: Why no factor of a matrix is found.
+SINGULAR = "a matrix of the body is singular in doubles: needed cells that differ less in size and shape"
 
 #: Right-hand sides solved at once; more of them leave the cache.
 BLOCK = 16
@@ -361,17 +365,25 @@ def elimination_order(matrix: sp.csc_array, interface: Ints) -> Ints:
         return interface
     inner = matrix[:, inside][inside]
     # an incomplete factorisation that drops everything costs little more than the order it finds
-    found = spilu(inner, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
+    try:
+        found = spilu(inner, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
+    except RuntimeError:
+        raise MeshError(SINGULAR) from None
     return np.concatenate([inside[np.argsort(found.perm_c)], interface])
 
 
 def _factor(matrix: sp.csc_array, order: Ints | None) -> Any:
-    """``L U`` of the matrix with its unknowns in the given order; without one, SuperLU chooses it."""
-    if order is None:
-        return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
-    ordered = matrix[:, order][order].tocsc()
-    ordered.eliminate_zeros()
-    return splu(ordered, permc_spec="NATURAL", **SYMMETRIC)
+    """``L U`` of the matrix with its unknowns in the given order; without one, SuperLU chooses it.
+
+    MeshError if a pivot is 0, by rounding or because the matrix is singular.
+    """
+    ordered = matrix.tocsc() if order is None else matrix[:, order][order].tocsc()
+    if order is not None:
+        ordered.eliminate_zeros()
+    try:
+        return splu(ordered, permc_spec="MMD_AT_PLUS_A" if order is None else "NATURAL", **SYMMETRIC)
+    except RuntimeError:
+        raise MeshError(SINGULAR) from None
 
 
 def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats], Floats]:
@@ -387,6 +399,11 @@ def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats]
     -------
     callable
         ``b -> matrix^-1 b`` for one column, shape (n,), or several, shape (n, k).
+
+    Raises
+    ------
+    MeshError
+        A pivot is 0, by rounding.
     """
     if matrix.shape[0] == 0:
         return lambda right: right
@@ -435,5 +452,10 @@ def _dense_solver(matrix: Floats) -> Callable[[Floats], Floats]:
     """``right -> matrix^-1 right``, factorised once."""
     if len(matrix) == 0:
         return lambda right: right
-    factor = lu_factor(matrix, check_finite=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LinAlgWarning)
+        try:
+            factor = lu_factor(matrix, check_finite=False)
+        except LinAlgWarning:
+            raise MeshError(SINGULAR) from None
     return lambda right: np.asarray(lu_solve(factor, right, check_finite=False))

@@ -25,6 +25,9 @@ class MeshError(ValueError):
 #: Coordinates are not larger than this: beyond, products of a few overflow a double.
 LARGEST = 1e30
 
+#: Lengths and square roots of areas of cells are not smaller than this: squares of their reciprocals fit a double.
+SMALLEST = 1e-40
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Cells:
@@ -64,8 +67,8 @@ class Mesh(Cells):
     Raises
     ------
     MeshError
-        Indices of cells or sides out of range, a cell of zero or negative measure, a node that no cell uses, cells
-        that lie on each other or touch without being joined, a side with a facet inside the body or listed twice.
+        Indices of cells or sides out of range, a cell of negative measure, zero or nearly so, a node that no cell uses,
+        cells that lie on each other or touch without being joined, a side with a facet inside the body or listed twice.
     """
 
     sides: Mapping[str, Ints]
@@ -93,10 +96,14 @@ class Mesh(Cells):
             outside = named[(named < 0) | (named >= len(points))]
             if len(outside):
                 raise MeshError(f"{what} name node {outside[0]}, the mesh has {len(points)} nodes")
-        positive = measures(points, cells) > 0
-        if not positive.all():
-            size = "length" if points.shape[1] == 1 else "area"
-            raise MeshError(f"cell {int(np.argmin(positive))} has no positive {size}")
+        sizes, size, least = measures(points, cells), "length", SMALLEST
+        if points.shape[1] == 2:
+            size, least = "area", SMALLEST**2
+        if not (sizes > 0).all():
+            raise MeshError(f"cell {int(np.argmin(sizes > 0))} has no positive {size}")
+        if not (sizes >= least).all():
+            cell = int(np.argmin(sizes))
+            raise MeshError(f"cell {cell} has the {size} {float(sizes[cell]):.2g}: at least {least:.2g} is needed")
         if cells.shape[1] > 3:
             convex = np.all([measures(points, np.roll(cells, i, axis=1)[:, :3]) > 0 for i in range(cells.shape[1])], 0)
             if not convex.all():

@@ -37,6 +37,15 @@ SECTIONS = ("SOLIDSECTION", "SHELLSECTION", "MEMBRANESECTION")
 #: Why a file with an include is refused.
 ONE_FILE = "it includes another file: needed one file that holds the whole mesh"
 
+#: Why a file is refused that is damaged where nothing more can be said.
+MISFIT = "its contents do not fit its format"
+
+#: What gmsh writes where it saves the elements of no group too.
+SAVE_ALL = "Mesh.SaveAll = 1 of gmsh writes such files; save it with Mesh.SaveAll = 0"
+
+#: Most characters of what meshio says that a message repeats.
+SAID = 100
+
 #: Exit status where the file is refused; stdout then holds the reason.
 REFUSED = 3
 
@@ -59,6 +68,13 @@ def contents(path: Path) -> dict[str, Any]:
     NotRead
         Unreadable, no triangles or other cells too, or no named lines.
     """
+    try:
+        return _contents(path)
+    except (ArithmeticError, LookupError, TypeError, ValueError):
+        raise NotRead(MISFIT) from None
+
+
+def _contents(path: Path) -> dict[str, Any]:
     kind = FORMATS[path.suffix.lower()]
     materials: set[str] | None = None
     if kind == "gmsh":
@@ -77,7 +93,8 @@ def contents(path: Path) -> dict[str, Any]:
             raise NotRead(f"needed text in UTF-8: {error.reason}") from None
     read, triangles, lines, groups = _by_meshio(path, kind)
     if triangles is None or len(triangles) == 0:
-        raise NotRead(f"no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")
+        remedy = "; give the surface a physical name too" if kind == "gmsh" and lines else ""
+        raise NotRead(f"no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}{remedy}")
     others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
     if others:
         raise NotRead(f"needed only triangles, it has {', '.join(others)} too")
@@ -93,12 +110,11 @@ def contents(path: Path) -> dict[str, Any]:
             " triangles into one group, or give young by the names of groups"
         )
     if not lines:
+        if empty := ", ".join(name for name, (_, of) in read.field_data.items() if of == 1):
+            raise NotRead(f"it names lines ({empty[:SAID]}), but no element belongs to one: {SAVE_ALL}")
         raise NotRead("no named lines; give the sides physical names")
     if kind == "gmsh":
-        try:
-            least = _least_number(path.read_bytes())
-        except (IndexError, KeyError, ValueError):
-            raise NotRead("its elements do not fit its format") from None
+        least = _least_number(path.read_bytes())
         if least < 1:
             raise NotRead(f"an element names node {least}: nodes are numbered from 1")
     points = np.asarray(read.points, dtype=float)
@@ -121,8 +137,12 @@ def _by_meshio(path: Path, kind: str) -> tuple[Any, Any, dict[str, Ints], dict[s
     except MemoryError:
         raise
     except (Exception, SystemExit) as error:
-        why = " ".join((words.getvalue() or f"{type(error).__name__}: {error}").split())
-        raise NotRead(f"meshio cannot read it ({why})") from None
+        if "Incompatible cell data 'gmsh:physical'" in str(error):
+            raise NotRead(f"some of its elements belong to a physical group and others to none: {SAVE_ALL}") from None
+        said = [*words.getvalue().splitlines(), str(error) if isinstance(error, ValueError) else ""][0].strip()
+        if not said or not said.isprintable() or "\\x" in said or said.startswith("Error"):
+            said = MISFIT
+        raise NotRead(f"meshio cannot read it ({said[:SAID]})") from None
 
 
 def _groups(read: Any, kind: str, dimension: int) -> dict[str, Ints]:

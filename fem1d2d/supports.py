@@ -75,8 +75,8 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
     body.  Cells that share a facet move as one piece; pieces that share only a node hinge on it.
     """
     n, d = mesh.points.shape
-    piece = _pieces(mesh)
-    pieces = int(piece.max()) + 1
+    piece = pieces(mesh)
+    count = int(piece.max()) + 1
     points = mesh.points.astype(float)
     centred = points - points.mean(axis=0)
     modes = np.zeros((n, d, 1 if d == 1 else 3))  # of one piece, evaluated at every node
@@ -86,17 +86,17 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
         size = np.abs(centred).max()
         modes[:, 0, 2], modes[:, 1, 2] = -centred[:, 1] / size, centred[:, 0] / size
     per_piece = modes.shape[2]
-    pairs = np.column_stack(np.divmod(np.unique(mesh.cells * pieces + piece[:, None]), pieces))
+    pairs = np.column_stack(np.divmod(np.unique(mesh.cells * count + piece[:, None]), count))
     home = np.full(n, -1)  # one piece of each node; the others must agree with it there
     home[pairs[::-1, 0]] = pairs[::-1, 1]
     hinge, other = pairs[pairs[:, 1] != home[pairs[:, 0]]].T
-    hinged = np.zeros((len(hinge), d, pieces, per_piece))
+    hinged = np.zeros((len(hinge), d, count, per_piece))
     each = np.arange(len(hinge))
     hinged[each, :, home[hinge]], hinged[each, :, other] = modes[hinge], -modes[hinge]
     node, component = np.nonzero(known)
-    held = np.zeros((len(node), pieces, per_piece))
+    held = np.zeros((len(node), count, per_piece))
     held[np.arange(len(node)), home[node]] = modes[node, component]
-    unknowns = pieces * per_piece
+    unknowns = count * per_piece
     matrix = np.concatenate([hinged.reshape(-1, unknowns), held.reshape(-1, unknowns)])
     kernel = np.eye(unknowns)
     if len(matrix):
@@ -105,12 +105,12 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
         _, values, right = np.linalg.svd(matrix)
         rank = int((values > 1e-9 * np.sqrt(n)).sum())
         kernel = right[rank:].T
-    motions = np.einsum("npm,nmk->npk", modes, kernel.reshape(pieces, per_piece, kernel.shape[1])[home])
+    motions = np.einsum("npm,nmk->npk", modes, kernel.reshape(count, per_piece, kernel.shape[1])[home])
     orthonormal, _ = np.linalg.qr(motions.reshape(n * d, kernel.shape[1]))
     return np.asarray(orthonormal.reshape(n, d, kernel.shape[1]))
 
 
-def _pieces(mesh: Mesh) -> NDArray[np.int64]:
+def pieces(mesh: Mesh) -> NDArray[np.int64]:
     """The piece of each cell, shape (c,): cells that share a facet lie in the same one."""
     c = len(mesh.cells)
     facets = mesh.cells.T.reshape(-1, 1) if mesh.dimension == 1 else edges(mesh.cells)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, ClassVar, TypeAlias
 
 from ndtheory.errors import HypothesisError
-from ndtheory.number import Level, Number, Numeric, exact, weakest
+from ndtheory.number import OF_SIZE, Level, Number, Numeric, UnusualSize, exact, weakest
 
 #: m, M, C_R, C_K and C_s C_tr, the last None where only C_K is known.
 Corner = tuple[Fraction, Fraction, Fraction, Fraction, Fraction | None]
@@ -28,10 +27,16 @@ Given: TypeAlias = Numeric | Number
 
 def take(key: str, value: Numeric, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
     """Read a number exactly; HypothesisError, quoting ``needed``, if it is none or the hypothesis does not hold."""
-    with suppress(ValueError):
+    try:
         number = exact(value)
         if holds(number):
             return number
+    except UnusualSize as error:
+        needed = (
+            needed if not holds(error.near) or "1e-" in needed else f"{needed}, {OF_SIZE}"
+        )  # which may say so already
+    except ValueError:
+        pass
     raise HypothesisError(key, value, needed)
 
 

@@ -32,6 +32,17 @@ SLACK = Decimal(10) ** -60
 LARGEST_EXPONENT = 300
 LARGEST, SMALLEST = Fraction(10**LARGEST_EXPONENT), Fraction(1, 10**LARGEST_EXPONENT)
 
+#: The same in words.
+OF_SIZE = f"of a size between 1e-{LARGEST_EXPONENT} and 1e{LARGEST_EXPONENT}"
+
+
+class UnusualSize(ValueError):
+    """A finite number larger than LARGEST, or smaller than SMALLEST and not 0; ``near`` is the nearest accepted one."""
+
+    def __init__(self, text: str, near: Fraction) -> None:
+        super().__init__(f"{text} is not a number of ordinary size")
+        self.near = near
+
 
 def weakest(levels: Iterable[Level]) -> Level:
     """The level of what is derived from numbers of these levels; ``exact`` where there are none.
@@ -151,7 +162,9 @@ def exact(value: Numeric) -> Fraction:
     Raises
     ------
     ValueError
-        Not a finite number, or an exponent beyond ``LARGEST_EXPONENT``.
+        Not a finite number.
+    UnusualSize
+        A finite one beyond ``LARGEST`` or ``SMALLEST``.
 
     Examples
     --------
@@ -163,7 +176,7 @@ def exact(value: Numeric) -> Fraction:
     if isinstance(value, Fraction):
         return value
     if isinstance(value, int) and value.bit_length() > 1000:
-        raise ValueError(f"an integer of {value.bit_length()} bits is not of ordinary size")
+        raise UnusualSize(f"an integer of {value.bit_length()} bits", LARGEST if value > 0 else -LARGEST)
     text = str(value).strip()
     if "_" in text or not text.isascii():
         raise ValueError(f"{text!r} is not a number")
@@ -171,13 +184,18 @@ def exact(value: Numeric) -> Fraction:
         parts = [Decimal(part) for part in text.split("/", maxsplit=1)]
     except InvalidOperation:
         raise ValueError(f"{text!r} is not a number") from None
-    if not all(part.is_finite() and abs(part.adjusted()) <= LARGEST_EXPONENT for part in parts):
-        raise ValueError(f"{text!r} is not a finite number of ordinary size")
+    if not all(part.is_finite() for part in parts):
+        raise ValueError(f"{text!r} is not a finite number")
     if 0 in parts[1:]:
         raise ValueError(f"{text!r} divides by zero")
+    exponents = [part.adjusted() for part in parts]
+    near = LARGEST if exponents[0] > sum(exponents[1:]) else SMALLEST
+    near *= math.prod(-1 if part < 0 else 1 for part in parts)
+    if not all(abs(exponent) <= LARGEST_EXPONENT for exponent in exponents):
+        raise UnusualSize(repr(text), near)
     result = Fraction(parts[0]) / Fraction(parts[-1] if len(parts) > 1 else 1)
     if result and not SMALLEST <= abs(result) <= LARGEST:
-        raise ValueError(f"{text!r} is not of ordinary size")
+        raise UnusualSize(repr(text), near)
     return result
 
 

@@ -105,3 +105,8 @@ def test_a_theta_of_the_command_line_is_refused_on_one_short_line(call, write, v
     assert line.isprintable()
     assert len(line) < 700
     assert_names(line, "theta = ", "0 < theta < 1")
+
+
+def test_an_id_that_resembles_no_statement_is_refused_without_a_guess(call):
+    assert call("verify", "9.99").complaint == "ndtheory verify: '9.99': no such statement; `ndtheory verify` lists all"
+    assert call("verify", "5.99").complaint.endswith("similar: 5.9, 5.39, 5.29")

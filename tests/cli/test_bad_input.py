@@ -123,6 +123,15 @@ TOGETHER = {
         },
         ["body2", "body1 and body2 can move rigidly together", "fix or prescribe"],
     ),
+    "a modulus beyond the doubles": (
+        {"body1.young": "1e400"},
+        ["young = 1E+400", "> 0, of a size between 1e-30 and 1e+30"],
+    ),
+    "a modulus below the doubles": ({"body1.young": '"1/1e400"'}, ["a size between 1e-30 and 1e+30"]),
+    "a part along both axes": (
+        {"body2.parts": '{ a = { side = "bottom", x = [0.4, 1.0], y = [0.0, 1.0] } }'},
+        ["body2.parts.a", "along x or along y, received both"],
+    ),
     "a fixed contact side": ({"body1.fixed": '["bottom", "top"]'}, ["body1.fixed", "normal component", "(0.4, 0)"]),
     "a fixed corner": (
         {"body2.prescribed": None, "body2.fixed": '["left"]'},
@@ -187,7 +196,8 @@ CONTENTS = {
     "Latin-1": ("title = 'Münze'".encode("latin-1"), ["UTF-8"]),
     "a null byte": (b"title = 'a'\n\0", ["not TOML"]),
     "brackets without end": (b"a = " + b"[" * 100_000, ["not TOML"]),
-    "a number of 9999 digits": (b"a = " + b"9" * 9999, ["not TOML", "digits"]),
+    "a number of 9999 digits": (b"a = " + b"9" * 9999, ["line 1", "too many digits", "up to 1e+30"]),
+    "an exponent of 20 digits": (b"a = 1\nb = 1e" + b"9" * 20, ["line 2", "too many digits"]),
     "JSON": (b'{"title": "a"}', ["not TOML", "line 1"]),
 }
 

@@ -89,7 +89,7 @@ def test_where_contraction_is_not_proved_a_line_says_so_and_nothing_is_written(c
     ("arguments", "said"),
     [
         ([], ["FILE", "--check"]),
-        (["--check", "small.toml"], ["small.toml", "a certificate"]),
+        (["--check", "small.toml"], ["small.toml: needed a certificate, a JSON document as"]),
         (["--check", "none.json"], ["none.json"]),
         (["--check", "list.json"], ["list.json", "schema"]),
         (["--check", "empty.json"], ["empty.json", "contraction", "discrete"]),

@@ -202,7 +202,24 @@ def test_a_file_cut_anywhere_is_refused_or_read_but_nothing_else_escapes(tmp_pat
 def test_the_refusal_of_an_unreadable_file_names_its_cause(tmp_path):
     path = tmp_path / "rubbish.inp"
     path.write_text("*NODE\n1, x, 0\n")
-    refused(path, r"meshio cannot read it \(ValueError: could not convert string to float: ' x'")
+    refused(path, r"meshio cannot read it \(could not convert string to float: ' x'\)")
+
+
+@pytest.mark.parametrize("rubbish", ["x" * 2000, "\x01" * 300, "\u00ff\u00fe" * 300])
+def test_the_refusal_of_rubbish_repeats_little_of_it(tmp_path, rubbish):
+    path = tmp_path / "rubbish.inp"
+    path.write_text(f"*NODE\n1, {rubbish}, 0\n", encoding="utf-8")
+    refused(path, "meshio cannot read it")
+    with pytest.raises(MeshError) as caught:
+        from_file(path)
+    assert len(str(caught.value)) < len(str(path)) + 140
+    assert str(caught.value).isprintable()
+
+
+def test_elements_of_no_group_beside_those_of_groups_are_refused_with_the_setting_of_gmsh(tmp_path):
+    path = tmp_path / "all.msh"
+    path.write_text(GMSH41.replace("3 0 1 0 1 1 0 1 9 2 3 -4", "3 0 1 0 1 1 0 0 2 3 -4"))
+    refused(path, "to a physical group and others to none: Mesh.SaveAll = 1 of gmsh .* save it with Mesh.SaveAll = 0")
 
 
 def test_a_file_in_another_encoding_is_refused(tmp_path):
@@ -301,8 +318,14 @@ def written(path, *elements):
         ([LINE, "2 2 9 1 1 2 -1", *CELLS], "an element names node -1: nodes are numbered from 1"),
         ([LINE, "2 2 9 1 1 2 7", *CELLS], "meshio cannot read it"),
         (["1 2 1 1 1 0", *CELLS], "an element names node 0: nodes are numbered from 1"),
-        (CELLS, "no named lines; give the sides physical names"),
-        ([LINE, *("2 3 9 1 1 2 3", "2 3 9 1 1 3 4")], "its elements do not fit its format"),
+        (
+            CELLS,
+            r"it names lines \(bottom\), but no element belongs to one: Mesh.SaveAll = 1 of gmsh writes such files",
+        ),
+        ([LINE, *CELLS, "2 2 9 1 1 2 " + "7" * 25], "its contents do not fit its format"),
+        ([LINE, *CELLS, "99 2 9 1 1 2"], r"meshio cannot read it \(its contents do not fit its format\)"),
+        ([LINE], "no triangles in it, only line; give the surface a physical name too"),
+        ([LINE, *("2 3 9 1 1 2 3", "2 3 9 1 1 3 4")], "its contents do not fit its format"),
     ],
 )
 def test_a_file_whose_cells_or_sides_do_not_fit_together_is_refused(tmp_path, elements, message):

@@ -166,7 +166,7 @@ def test_a_body_that_contact_alone_holds_is_refused_as_neumann_body_alone(singul
         ({"S1": lambda u: u, "S2": lambda u: u}, "how many unknowns body 1 has"),
         ({"S1": lambda u: u, "S2": lambda u: u, "unknowns": 0}, "whole number > 0"),
         ({"S1": lambda u: u, "S2": lambda u: u, "unknowns": 4}, r"solve2.*solve1|solve1.*solve2"),
-        ({"S1": lambda u: u[:3], "solve2": np.eye(4)}, "what S1 returns is 3: needed 4"),
+        ({"S1": lambda u: u[:3], "solve2": np.eye(4)}, "what S1 returns is a vector of 3: needed 4"),
         ({"S1": lambda u: u * np.nan, "solve2": np.eye(4)}, "what S1 returns has entries that are not finite"),
         ({"S1": lambda u: -u, "solve2": np.eye(4)}, "S1 is not positive"),
         ({"S1": lambda u: u + np.cumsum(u), "solve2": np.eye(4)}, "S1 is not symmetric"),

@@ -295,11 +295,26 @@ def test_a_matrix_in_place_of_the_kernel_and_the_law_it_comes_from_give_one_oper
 # --- what is refused --------------------------------------------------------------------------------------------------
 
 
+def test_without_friction_matrices_need_no_positions_of_their_nodes():
+    given = as_matrices(build(small(friction=0))) | {"kernel": None}
+    placed, bare = build(**given), build(**given | {"x": None})
+    one, two = vf.run(placed), vf.run(bare)
+    assert (two.converged, two.iterations) == (True, one.iterations)
+    assert np.array_equal(two.last.g, one.last.g)
+    assert two.contact.x.tolist() == [*range(7)]
+    assert two.contact.pressure == pytest.approx(one.contact.pressure * placed.contact.grid.weights)
+    assert vf.advise(bare).to_dict()["roles"] == vf.advise(placed).to_dict()["roles"]
+    assert vf.measure(bare).rho_max == vf.measure(placed).rho_max
+    for friction in ("1/10", np.full(7, 0.1), lambda s: s):
+        with pytest.raises(ValueError, match="needed x, the positions"):
+            build(**given | {"x": None, "friction": friction})
+
+
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"S1": None}, "S1, S2 and x"),
-        ({"x": None}, "S1, S2 and x"),
+        ({"S1": None}, "S1 and S2"),
+        ({"x": None}, "needed x, the positions of the contact nodes, as there is friction"),
         ({"S1": np.eye(14)[:, :13]}, "square"),
         ({"S1": np.eye(13)}, "two components"),
         ({"S1": -np.eye(14)}, "positive definite"),
@@ -322,3 +337,10 @@ def test_a_matrix_in_place_of_the_kernel_and_the_law_it_comes_from_give_one_oper
 def test_what_does_not_fit_is_refused_in_words(changes, why):
     with pytest.raises(ValueError, match=why):
         build(**as_matrices(build(small())) | changes)
+
+
+@pytest.mark.parametrize("given", [None, 3, [], {}])
+def test_what_is_no_problem_is_refused_by_every_function_that_takes_one(given):
+    for take in (vf.solve, vf.run, vf.measure, vf.advise, vf.compare, vf.march, vf.sweep, vf.certify):
+        with pytest.raises(ValueError, match="needed a problem"):
+            take(given)

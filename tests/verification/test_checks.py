@@ -152,7 +152,7 @@ def test_a_strain_above_5_percent_is_warned_of_with_its_element():
         assert found.checks.largest_strain == pytest.approx(-float(pushed) / 1.2)
         words = strained(found.warnings)
         assert len(words) == (found.checks.largest_strain > checks.LARGE_STRAIN)
-        assert not words or words[0].startswith("the largest principal strain is 5 %, in the element at (")
+        assert not words or words[0].startswith("the largest principal strain is 5 % at (")
 
 
 # --- documents --------------------------------------------------------------------------------------------------------

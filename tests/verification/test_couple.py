@@ -111,11 +111,11 @@ def test_what_a_solver_raises_reaches_the_caller_and_nothing_is_called_after_it(
     ("answer", "words"),
     [
         (lambda x: x * np.nan, "not finite"),
-        (lambda x: np.append(x, 1.0), "4: needed a vector of 3 numbers"),
+        (lambda x: np.append(x, 1.0), "4: needed a vector of 3 real numbers"),
         (lambda x: "three", "needed a vector"),
         (lambda x: None, "needed a vector"),
         (lambda x: 1j * x, "no real numbers"),
-        (lambda x: np.zeros((3, 1)), "3 x 1: needed a vector of 3 numbers"),
+        (lambda x: np.zeros((3, 1)), "3 x 1: needed a vector of 3 real numbers"),
     ],
 )
 @pytest.mark.parametrize("who", ["neumann", "contact"])
@@ -209,8 +209,8 @@ def test_an_own_rule_that_works_on_vectors_is_taken():
         ({"max_iterations": 0}, "max_iterations = 0: needed a whole number > 0"),
         ({"max_iterations": 2.5}, "max_iterations = 2.5: needed a whole number > 0"),
         ({"max_iterations": None}, "max_iterations = None: needed a whole number > 0"),
-        ({"start": [[1.0]]}, "start has the shape 1 x 1: needed a vector"),
-        ({"start": []}, "start has the shape 0: needed a vector"),
+        ({"start": [[1.0]]}, "start is 1 x 1: needed a vector"),
+        ({"start": []}, "start is a vector of 0: needed a vector"),
         ({"start": ["a"]}, "start has no real numbers"),
     ],
 )

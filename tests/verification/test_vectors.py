@@ -221,8 +221,8 @@ def test_the_document_has_the_vectors_and_the_ends():
 @pytest.mark.parametrize(
     ("X", "TX", "needed"),
     [
-        ([[1.0, 2.0]], [[1.0, 2.0]], "X is 1 x 2: needed a row for each iterate, two rows or more"),
-        ([1.0, 2.0], [1.0, 2.0], "X is 2: needed a row for each iterate"),
+        ([[1.0, 2.0]], [[1.0, 2.0]], "X is 1 x 2: needed a row of real numbers for each iterate, two rows or more"),
+        ([1.0, 2.0], [1.0, 2.0], "X is a vector of 2: needed a row of real numbers for each iterate"),
         ([[1.0], [2.0]], [[1.0], [2.0], [3.0]], "X and TX are 2 x 1 and 3 x 1"),
         ([[1.0], [np.nan]], [[1.0], [2.0]], "X has entries that are not finite"),
         ([[1.0], [2.0]], [["a"], ["b"]], "TX has no real numbers"),
@@ -233,3 +233,30 @@ def test_the_document_has_the_vectors_and_the_ends():
 def test_bad_vectors_are_refused(X, TX, needed):
     with pytest.raises(ValueError, match=needed):
         vf.advise_vectors(X, TX)
+
+
+@pytest.mark.filterwarnings("error")
+def test_images_that_are_their_iterates_are_solutions_and_show_no_spectrum():
+    X = np.random.default_rng(4).normal(size=(5, 3))
+    with pytest.raises(ValueError, match="T x = x for every iterate, up to rounding: each is a solution already"):
+        vf.advise_vectors(X, X + 1e-14)
+    with pytest.raises(ValueError, match=r"T x - x is the same for every iterate.*all eigenvalues are -1"):
+        vf.advise_vectors(X, X + 0.3)
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_eigenvalue_of_minus_one_leaves_no_theta():
+    X = np.random.default_rng(5).normal(size=(5, 3))
+    found = vf.advise_vectors(X, X * [1.0, -2.0, -3.0])
+    assert found.theta is None
+    assert "an eigenvalue is -1: with -1 or less no theta above 0 converges" in found.why_no_theta
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("unit", [1e-200, 1e59])
+def test_vectors_in_any_unit_show_the_same_spectrum(unit):
+    X = np.random.default_rng(6).normal(size=(5, 3))
+    image = -X * [0.5, 1.0, 2.0]
+    one, two = (vf.advise_vectors(X * size, image * size) for size in (1.0, unit))
+    assert two.spectrum.low == pytest.approx(one.spectrum.low)
+    assert two.spectrum.high == pytest.approx(one.spectrum.high)

@@ -303,7 +303,7 @@ def _with_friction(
         x=positions,
         weights=weights,
         law=law,
-        kernel=_plain(kernel),
+        kernel=kernel,
         transfer=matrix,
         friction=friction,
         neumann_body=neumann_body,
@@ -312,13 +312,9 @@ def _with_friction(
     return replace(found, roles=tuple(replace(role, theta_auto=None) for role in found.roles))
 
 
-def _plain(matrix: Any) -> Any:
-    return matrix.toarray() if sp.issparse(matrix) else matrix
-
-
 def _of_nodes(P: Transfer, n: int) -> Floats:
     """P of one component at the nodes."""
-    whole = np.asarray(_plain(P.P), dtype=float)
+    whole: Floats = P.P.toarray() if sp.issparse(P.P) else P.P
     if P.components == 2:
         return whole
     m = whole.shape[1] // 2

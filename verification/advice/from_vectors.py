@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ndtheory import Number
 from verification.advice import methods
 from verification.advice.methods import MethodRow
 from verification.advice.roles import PROVED, Advice, Role, role_on, table_of
 from verification.advice.spectrum import SeenVectors, Spectrum, seen_in
-from verification.interface.matrices import real_array
+from verification.interface.matrices import real_array, size
 from verification.interface.pair import UNITS
 
 #: Why nothing is proved.
@@ -50,6 +48,7 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
 
     Examples
     --------
+    >>> import numpy as np
     >>> image = lambda x: 1 - np.array([0.5, 3.0]) * (x - 1)
     >>> X = [np.zeros(2)]
     >>> for _ in range(3):
@@ -58,21 +57,14 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
     >>> round(found.spectrum.low, 9), round(found.spectrum.high, 9), found.theta
     (0.5, 3.0, 0.3636)
     """
-    given = []
-    for name, rows in (("X", X), ("TX", TX)):
-        try:
-            array = np.asarray(rows, dtype=None)
-        except ValueError:
-            raise ValueError(f"{name} has rows of different lengths: needed one length for all iterates") from None
-        if array.ndim != 2 or len(array) < 2 or array.shape[1] == 0:
-            shape = " x ".join(map(str, array.shape)) or "a number"
-            raise ValueError(f"{name} is {shape}: needed a row for each iterate, two rows or more")
-        given.append(array)
+    needed = "a row of real numbers for each iterate, two rows or more"
+    given = [real_array(name, rows, (None, None), needed) for name, rows in (("X", X), ("TX", TX))]
     if given[0].shape != given[1].shape:
-        shapes = " and ".join(f"{a.shape[0]} x {a.shape[1]}" for a in given)
+        shapes = " and ".join(map(size, given))
         raise ValueError(f"X and TX are {shapes}: needed an image for each iterate, of the same length")
-    found = [real_array(name, array, array.shape) for name, array in zip(("X", "TX"), given, strict=True)]
-    return advice_of(seen_in(*found, tied=tied), tied=tied)
+    if len(given[0]) < 2:
+        raise ValueError(f"X is {size(given[0])}: needed {needed}")
+    return advice_of(seen_in(*given, tied=tied), tied=tied)
 
 
 def advice_of(seen: SeenVectors, *, tied: bool = False) -> Advice:

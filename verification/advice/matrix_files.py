@@ -16,7 +16,7 @@ from scipy.io.matlab import MatReadError
 
 from fem1d2d.mesh import Floats
 from verification.interface.files import NEEDED
-from verification.interface.matrices import MOST_ROWS, UNREADABLE, headers
+from verification.interface.matrices import MOST_ROWS, UNREADABLE, headers, real_array
 from verification.problem.tables import ProblemError, short, unreadable
 
 #: Largest size of a matrix file: a full matrix of MOST_ROWS rows, with the two indices of each entry.
@@ -60,11 +60,17 @@ def read_matrix(path: Path, name: str = "") -> Floats:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of numbers that do not fit their type: what comes out is checked
-            return _real(read(path, name))
+            return _real(read(path, name), name)
     except _Refusal as error:
         raise refuse(str(error)) from None
     except DAMAGED:
         raise refuse(f"not {written}") from None
+
+
+def read_vector(path: Path, name: str = "") -> Floats:
+    """The same, where one row or one column is a vector."""
+    array = read_matrix(path, name)
+    return array.ravel() if array.size == max(array.shape, default=0) else array
 
 
 def read_array(path: Path, name: str) -> Floats:
@@ -78,7 +84,7 @@ def read_array(path: Path, name: str) -> Floats:
         with path.open("rb") as file:
             _within(max(_rows(file), default=0))
             file.seek(0)
-            return _real(np.load(file, allow_pickle=False)[name])
+            return _real(np.load(file, allow_pickle=False)[name], name)
     except _Refusal as error:
         raise ProblemError(str(path), name, None, str(error)) from None
     except DAMAGED:
@@ -110,11 +116,11 @@ def _within(rows: int) -> None:
         raise _Refusal(f"needed at most {MOST_ROWS} rows, received {rows}")
 
 
-def _real(matrix: np.ndarray) -> Floats:
-    if matrix.dtype.kind not in "fiu":
-        received = ", received complex ones" if matrix.dtype.kind == "c" else ""
-        raise _Refusal(f"not a matrix that numpy or scipy saved: needed real numbers{received}")
-    return np.asarray(matrix, dtype=float)
+def _real(matrix: np.ndarray, name: str) -> Floats:
+    try:
+        return real_array(name or "the array", matrix, matrix.shape, "real numbers", most=math.inf)
+    except ValueError as error:
+        raise _Refusal(str(error)) from None
 
 
 def _chosen(names: list[str], name: str) -> str:

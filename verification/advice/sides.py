@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import LinearOperator
 
-from fem1d2d import solver_with_inertia
+from fem1d2d import MeshError, solver_with_inertia
 from fem1d2d.mesh import Floats
 from verification.advice import BodyNumber
 from verification.interface.matrices import MOST_ROWS, Stiffness, real_array, size, stiffness
@@ -151,14 +151,20 @@ def is_operator(S: Any) -> bool:
     return isinstance(S, LinearOperator) or callable(S)
 
 
-def dense(name: str, matrix: Any) -> Floats:
-    """A matrix of real numbers, dense."""
+def dense(name: str, matrix: Any, needed: str = "a matrix of real numbers") -> Floats:
+    """A matrix of real numbers, dense, in any unit."""
     if matrix is None:
         raise ValueError(f"no {name}: needed S1 and S2, or an operator for each")
-    array = np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix)
-    if array.dtype.kind not in "fiu":
-        raise ValueError(f"{name} has no real numbers (numpy type {array.dtype}): needed a matrix of them")
-    return np.asarray(array, dtype=float)
+    return real_array(name, matrix, (None, None), needed, most=np.inf)
+
+
+def sparse(name: str, matrix: Any) -> sp.csc_array | None:
+    """A sparse matrix of real numbers; None where it is not sparse."""
+    if not sp.issparse(matrix):
+        return None
+    found = sp.csc_array(matrix)
+    found.data = real_array(name, found.data, found.data.shape, "real numbers", most=np.inf)
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +192,7 @@ def of_matrix(body: BodyNumber, S: Any, *, general: bool = False) -> Side:
         No stiffness.
     """
     name = f"S{body}"
-    S = stiffness(name, dense(name, S), asymmetry=TOLD, general=general)
+    S = stiffness(name, dense(name, S, "a square matrix of real numbers"), asymmetry=TOLD, general=general)
     n, free = len(S.matrix), S.motions.shape[1]
     seen = SeenMatrix(rows=n, form="matrix", asymmetry=S.asymmetry, zeros=S.zeros, free_motions=free)
     return Side(matrix=S, apply=S.matrix.__matmul__, seen=seen)
@@ -238,8 +244,8 @@ def of_solver(body: BodyNumber, S: Any, solve: Any, n: int) -> Side:
         if inverse is None and not side.singular:
             factor = cho_factor(side.matrix.matrix)
             inverse = lambda f: np.asarray(cho_solve(factor, f))
-    elif sp.issparse(S):
-        side, inverse = _of_sparse(name, sp.csc_array(S), inverse)
+    elif (matrix := sparse(name, S)) is not None:
+        side, inverse = _of_sparse(name, matrix, inverse)
     seen, apply = side.seen, side.apply
     u, v = np.random.default_rng(1).standard_normal((2, n))
     if apply is not None:
@@ -276,7 +282,7 @@ def _of_sparse(name: str, S: sp.csc_array, inverse: Apply | None) -> tuple[Side,
     if inverse is None:
         try:
             inverse, negative = solver_with_inertia(symmetric)
-        except RuntimeError:  # a pivot is 0
+        except MeshError:  # a pivot is 0
             negative = None
         if negative is None or negative:
             raise ValueError(f"{name} is not positive definite: needed a Schur complement of a stiffness matrix")
@@ -303,7 +309,7 @@ def _function(name: str, given: Any, n: int) -> Apply | None:
         function = given
 
     def checked(vector: Floats) -> Floats:
-        return real_array(f"what {name} returns", np.asarray(function(vector)), (n,))
+        return real_array(f"what {name} returns", function(vector), (n,), most=np.inf)
 
     return checked
 
@@ -354,12 +360,10 @@ def read_transfer(given: Any, rows: dict[int, int], neumann_body: BodyNumber | N
             sizes = ", ".join(f"S{body} is {n} x {n}" for body, n in rows.items())
             raise ValueError(f"{sizes}: needed matrices on the same interface unknowns, or a transfer")
         return None
-    P = given if isinstance(given, LinearOperator) or sp.issparse(given) else dense("the transfer", given)
-    if len(P.shape) != 2 or min(P.shape) == 0:
+    P: Any = given if isinstance(given, LinearOperator) else sparse("the transfer", given)
+    P = dense("the transfer", given) if P is None else P
+    if min(P.shape) == 0:
         raise ValueError(f"the transfer is {size(P)}: needed a matrix")
-    entries = None if isinstance(P, LinearOperator) else P.data if sp.issparse(P) else P
-    if entries is not None and (np.asarray(entries).dtype.kind not in "fiu" or not np.isfinite(entries).all()):
-        raise ValueError("the transfer has entries that are not finite numbers: needed real ones")
     bodies: tuple[BodyNumber, ...] = BODIES if neumann_body is None else (neumann_body,)
     fits = [
         (body, components)

@@ -7,6 +7,7 @@ are real and at least 0 where both stiffnesses are symmetric; open nodes have la
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -56,6 +57,10 @@ OPEN = 1e-12
 
 #: An eigenvalue is complex if its imaginary part exceeds this share of the largest 1 + lambda.
 REAL = 0.02
+
+#: The meaning of images that equal their iterates, and of those that one vector moves away from them.
+SOLVED = "each is a solution already, or X was given for TX; needed iterates from before the run has converged"
+SHIFTED = "all eigenvalues are -1, with which no theta above 0 converges; one solver probably has the wrong sign"
 
 Complex = NDArray[np.complex128]
 
@@ -208,7 +213,7 @@ class SeenVectors(Value):
         if self.ritz.real.max() < -REAL:
             needed = "the second solver must return the force that acts on the first body"
             return f"all eigenvalues are negative: one solver probably has the wrong sign ({needed})"
-        if self.ritz.real.min() <= -1:
+        if self.ritz.real.min() <= RANK - 1:
             return f"an eigenvalue is {self.ritz.real.min():.3g}: with -1 or less no theta above 0 converges"
         return ""
 
@@ -250,7 +255,7 @@ def seen_in(X: Floats, TX: Floats, *, tied: bool = False, starts: NDArray[np.boo
     Raises
     ------
     ValueError
-        The iterates do not differ above rounding.
+        The iterates, or their residuals, do not differ above rounding.
     """
     given, last = len(X), len(X) if tied else _last_piece(TX)
     changing, read = last < given, last if last >= FEWEST else given
@@ -259,7 +264,8 @@ def seen_in(X: Floats, TX: Floats, *, tied: bool = False, starts: NDArray[np.boo
     values, residuals, noise = _ritz(X, TX, inside)
     low, high = (_error(values, residuals, i) for i in (0, -1))
     negative = bool(values[0].real < 1 - max(REAL, low))
-    modes = _modes(values, residuals / np.abs(values), X.shape[1])
+    sizes = np.abs(values)
+    modes = _modes(values, residuals / np.maximum(sizes, RANK * sizes.max()), X.shape[1])
     spectrum = Spectrum(values=modes - 1, source="vectors", error_low=low, error_high=high)
     before = _before(X, TX, inside, len(values))
     steady = lambda ends: len(before) > 0 and max(ends) <= (1 + STEADY) * min(ends)
@@ -304,13 +310,19 @@ def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> tuple[Complex, Fl
 
     Differences of consecutive rows count where ``inside``.
     """
-    D, E = (np.diff(rows, axis=0)[inside].T for rows in (X, TX - X))
+    largest = float(np.abs(TX).max())
+    unit = math.ldexp(1.0, math.frexp(max(largest, float(np.abs(X).max())))[1])  # a power of 2: no digit changes
+    D, E = (np.diff(rows, axis=0)[inside].T / unit for rows in (X, TX - X))
     lengths = np.linalg.norm(D, axis=0)
-    accuracy = _accuracy(X, TX) * float(np.abs(TX).max(initial=0.0))
+    accuracy = _accuracy(X, TX) * largest / unit
     kept = lengths > ROUNDING * accuracy
     if not kept.any():
         raise ValueError("the iterates do not differ above rounding: needed two different ones")
     D, E = D[:, kept] / lengths[kept], E[:, kept] / lengths[kept]
+    if (np.linalg.norm(E, axis=0) <= accuracy / lengths[kept]).all():
+        if np.abs(TX - X).max() <= accuracy * unit:
+            raise ValueError(f"T x = x for every iterate, up to rounding: {SOLVED}")
+        raise ValueError(f"T x - x is the same for every iterate, up to rounding: {SHIFTED}")
     U, sigma, Vt = np.linalg.svd(D, full_matrices=False)
     images = -E @ Vt.T
     sizes = np.linalg.norm(images, axis=0)
@@ -332,7 +344,9 @@ def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> tuple[Complex, Fl
 def _accuracy(X: Floats, TX: Floats) -> float:
     """Accuracy of vectors relative to the largest entry: as they were computed in doubles, or rounded to be written."""
     some = np.concatenate([TX.ravel()[:SOME], X.ravel()[:SOME]])
-    if (some == some.astype(np.float32)).all():
+    with np.errstate(over="ignore"):
+        single = some.astype(np.float32)
+    if (some == single).all():
         whole = (some == np.rint(some)).all()  # numbers that any format holds
         return DOUBLE if whole else SINGLE
     for digits in range(1, DIGITS):

@@ -18,6 +18,7 @@ from verification.algorithm.relaxation import Rule
 from verification.algorithm.theta import begin
 from verification.contact import NoMinimiser, Solver
 from verification.interface.build import pair_of
+from verification.interface.matrices import real_array
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
@@ -132,17 +133,11 @@ def forces(given: ArrayLike, pair: ContactPair, source: str = "") -> Floats:
         Another shape, or an entry that is not finite.
     """
     size = pair.neumann.grid.size
-    needed = f"needed {size} finite nodal forces on the contact nodes of the Neumann body, tangential ones first"
-    refuse = lambda received: ProblemError(source or pair.source, "start", received, needed)
+    needed = f"{size} finite nodal forces on the contact nodes of the Neumann body, tangential ones first"
     try:
-        g: Floats = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        raise refuse(type(given).__name__) from None
-    if g.size != size:
-        raise refuse(f"an array of shape {g.shape}")
-    if not np.isfinite(g).all():
-        raise refuse(f"{g[~np.isfinite(g)][0]}")
-    return g.ravel()
+        return real_array("g", given, (size,), needed)
+    except ValueError as error:
+        raise ProblemError(source or pair.source, "start", None, str(error)) from None
 
 
 def tied_force(pair: ContactPair) -> Floats:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, ClassVar
 
 from ndtheory.number import Numeric
@@ -25,7 +26,7 @@ from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate
 from verification.constants import Measured, measure
 from verification.document import Document
 from verification.interface.pair import UNITS, ContactPair, pair_from
-from verification.problem import Problem, ProblemError
+from verification.problem import Problem, ProblemError, load
 from verification.progress import Progress, silent
 
 
@@ -122,7 +123,7 @@ class Certificate(Document):
 
 
 def certify(
-    problem: Problem,
+    problem: Problem | Path | str,
     *,
     theta: Numeric | None = None,
     edition: str | None = None,
@@ -133,7 +134,7 @@ def certify(
 
     Parameters
     ----------
-    problem : Problem
+    problem : Problem or path
         Two plane bodies.
     theta : number or 'auto', optional
         The problem's by default.
@@ -163,6 +164,7 @@ def certify(
     >>> found.lower < found.factor < 1
     True
     """
+    problem = problem if isinstance(problem, Problem) else load(problem)
     refuse = lambda key, needed: ProblemError(problem.source, key, None, needed)
     edition = strongest() if edition is None else edition
     if edition not in certifying():

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -> Advice:
     """The advice from the options of ``advise matrices`` that were given, S1 among them, by parameter."""
     from verification.advice.from_matrices import advise_matrices
-    from verification.advice.matrix_files import is_interface, names_in, read_matrix
+    from verification.advice.matrix_files import is_interface, names_in, read_matrix, read_vector
     from verification.advice.roles import advise
 
     context = click.get_current_context()
@@ -45,12 +45,10 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
     if S1 == S2 and set(names_in(S1)).intersection(("S1", "S2")) == {"S1"}:
         raise click.UsageError(f"{S1}: needed arrays S1 and S2 for --S2 as well, received S1 alone", context)
     values: dict[str, Any] = {"S1": read_matrix(S1, "S1"), "S2": read_matrix(S2, "S2")}
-    for name in ("transfer", "x", "kernel", "weights"):
+    reads = {"transfer": read_matrix, "kernel": read_matrix, "x": read_vector, "weights": read_vector}
+    for name, read in reads.items():
         if name in given:
-            values[name] = read_matrix(given[name], "P" if name == "transfer" else name)
-    for name in ("x", "weights"):
-        if name in values and values[name].size == max(values[name].shape, default=0):
-            values[name] = values[name].ravel()  # one row or one column
+            values[name] = read(given[name], "P" if name == "transfer" else name)
     if "transfer" in given and "friction" in given:
         values |= _grids(given["transfer"], given)
     values |= {name: given[name] for name in ("radius", "friction") if name in given}

@@ -143,6 +143,10 @@ def _check(path: Path, problem: Any, as_json: bool) -> int:
         raise ProblemError(str(path), "", None, why)
     try:
         document = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        needed = "needed a certificate, a JSON document as `ndtheory certify FILE -o certificate.json` writes it"
+        raise ProblemError(str(path), "", None, needed) from None
+    try:
         with stages() as tell:
             tell(f"checking {path}", None)
             found = check_again(document, problem)

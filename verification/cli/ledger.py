@@ -95,11 +95,12 @@ def _named(id: str) -> list[str]:
     known = statements()
     parts = [id] if id in known else [other for other in known if id and other.startswith(f"{id}.")]
     if not parts:
-        near = nearest(id, known, most=3) or list(known)[:3]
+        near = nearest(id, known, most=3)
+        meant = f"similar: {', '.join(near)}" if near else "`ndtheory verify` lists all"
         context = click.get_current_context()
         from verification.problem.tables import short
 
-        raise click.UsageError(f"{short(id)!r}: no such statement; similar: {', '.join(near)}", context)
+        raise click.UsageError(f"{short(id)!r}: no such statement; {meant}", context)
     return parts
 
 

@@ -232,9 +232,10 @@ def _tracker() -> str:
 
 def _explain(error: BaseException) -> int:
     """Bad input in one line; anything else is a bug and says so."""
+    from fem1d2d import MeshError
     from verification.problem.tables import ProblemError
 
-    if isinstance(error, (ProblemError, HypothesisError, click.ClickException)):
+    if isinstance(error, (ProblemError, HypothesisError, MeshError, click.ClickException)):
         complain(f"ndtheory: {error}")
         return BAD_INPUT
     if isinstance(error, OSError):

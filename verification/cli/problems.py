@@ -141,7 +141,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
       ndtheory run my.toml --start g.npy
     """
     problem = load_problem(file, **changes)  # before what loads arrays: a file may be missing
-    from verification.advice.matrix_files import read_matrix
+    from verification.advice.matrix_files import read_vector
     from verification.algorithm import runs
     from verification.algorithm.start import forces
     from verification.interface.pair import pair_from
@@ -150,7 +150,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
 
     write = None if folder is None else Folder(folder, "run").write
     pair = pair_from(problem)
-    g = None if start is None else forces(read_matrix(start), pair, str(start))
+    g = None if start is None else forces(read_vector(start), pair, str(start))
     warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
         finished = runs.run(pair, start=g, solver=solver, watch=watch)

@@ -89,14 +89,13 @@ class Coupling:
         ValueError
             Other shapes, or numbers that are not finite.
         """
-        g = _vector("g", g, len(self._seen[-1][0]) if self._seen else None)
-        image = _vector("Tg", Tg, len(g))
-        self.see(g, image)
-        return self._following(g, image)
+        self.see(g, Tg)
+        return self._following(*self._seen[-1][:2])
 
-    def see(self, g: Floats, image: Floats) -> None:
-        """Take in an evaluation without asking for the next force."""
-        self._seen.append((g, image, self._anew))
+    def see(self, g: Any, Tg: Any) -> None:
+        """Take in an evaluation without asking for the next force; parameters and errors as for :meth:`next`."""
+        g = _vector("g", g, len(self._seen[-1][0]) if self._seen else None)
+        self._seen.append((g, _vector("Tg", Tg, len(g)), self._anew))
         self._anew, self._advice = False, None
 
     def new_step(self) -> None:
@@ -305,11 +304,8 @@ def couple(
 
 def _vector(name: str, given: Any, size: int | None = None) -> Floats:
     """A copy as an array of shape (n,); ValueError where it is none."""
-    array = np.atleast_1d(np.asarray(given))
-    if array.ndim != 1 or not len(array) or len(array) != (size or len(array)):
-        shape = " x ".join(map(str, array.shape))
-        raise ValueError(f"{name} has the shape {shape}: needed a vector{f' of {size} numbers' * (size is not None)}")
-    return real_array(name, array, array.shape).copy()
+    needed = "a vector of real numbers" if size is None else f"a vector of {size} real numbers"
+    return real_array(name, given, (size,), needed, alone=size in (None, 1))
 
 
 def _answer(name: str, solver: Solver, given: Floats, iterations: int) -> Floats:
@@ -317,7 +313,7 @@ def _answer(name: str, solver: Solver, given: Floats, iterations: int) -> Floats
     answer = solver(given.copy())
     try:
         return _vector(f"what {name} returned", answer, len(given))
-    except (ValueError, TypeError) as error:
+    except ValueError as error:
         raise CouplingError(f"evaluation {iterations}: {error}") from None
 
 

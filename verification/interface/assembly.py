@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem1d2d import (
     Mesh,
@@ -17,6 +18,7 @@ from fem1d2d import (
     facet_weights,
     from_file,
     interval,
+    pieces,
     rectangle,
     rigid_motions,
     stiffness,
@@ -93,13 +95,39 @@ def _or_solve(name: str) -> str:
     return f"more sides of {name}, or use `ndtheory solve`"
 
 
+def _moved(body: Body, motions: Floats) -> NDArray[np.bool_]:
+    """Return the cells that some of these motions of the unknowns move, shape (c,)."""
+    everywhere = np.zeros((body.known.held.size, motions.shape[1]))
+    everywhere[body.positions] = motions if body.turned is None else body.turned.T @ motions
+    moves = np.abs(everywhere).max(axis=1, initial=0.0).reshape(-1, body.mesh.dimension).max(axis=1) > STILL
+    return np.asarray(moves[body.mesh.cells].any(axis=1))
+
+
 def _loose(problem: Problem, body: Body) -> list[int]:
     """Return the numbers of the bodies of a union that can move rigidly."""
-    motions = np.zeros((body.known.held.size, body.motions.shape[1]))
-    motions[body.positions] = body.motions if body.turned is None else body.turned.T @ body.motions
-    moves = np.abs(motions).max(axis=1, initial=0.0).reshape(-1, body.mesh.dimension).max(axis=1) > STILL
-    of_cell = moves[body.mesh.cells].any(axis=1)
-    return [i for i in problem.numbers(int(body.name[-1])) if of_cell[body.mesh.surfaces[f"body{i}"]].any()]
+    moved = _moved(body, body.motions)
+    return [i for i in problem.numbers(int(body.name[-1])) if moved[body.mesh.surfaces[f"body{i}"]].any()]
+
+
+def _check_pieces(problem: Problem, body: Body) -> None:
+    """Refuse a body with a piece that can move though neither the body's supports nor its contact nodes do."""
+    if body.motion_traces.shape[1] == body.motions.shape[1]:
+        return
+    _, values, right = np.linalg.svd(body.motions[body.interface], full_matrices=False)
+    felt = right[values > STILL]
+    moved = _moved(body, body.motions - body.motions @ felt.T @ felt)
+    piece = pieces(body.mesh)
+    first = int(np.argmax(moved))
+    corners = body.mesh.points[body.mesh.cells[piece == piece[first]]].reshape(-1, body.mesh.dimension)
+    ends = zip("xy", corners.min(axis=0), corners.max(axis=0), strict=False)
+    where = " and ".join(f"{axis} = {low:.6g} to {high:.6g}" for axis, low, high in ends)
+    owners = (
+        name
+        for name, _, prefix in _owners(getattr(problem, body.name), body.name)
+        if not prefix or first in body.mesh.surfaces[name]
+    )
+    needed = f"the piece at {where} can move rigidly where no contact node feels it: fix or prescribe a side of it"
+    raise problem.refuse(next(owners), None, f"{needed}, or leave it out")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -253,23 +281,18 @@ def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
     """Refuse bodies that the iteration cannot take: contact may hold the contact body, and no other."""
     problem = bodies.problem
     for body in bodies.elastic:
-        k, number = body.motions.shape[1], int(body.name[-1])
-        if not k:
+        if not body.motions.shape[1]:
             continue
-        if number == problem.iteration.neumann_body:
+        if int(body.name[-1]) == problem.iteration.neumann_body:
             raise SingularRole.of(problem, body, next(one for one in bodies.elastic if one is not body))
         name = f"body{_loose(problem, body)[0]}" if problem.contact.lines else body.name
-        moves = f"{name} can move rigidly"
         if problem.dimension == 1:
             needed = "its loads are its contact force, and nothing is left to iterate; `ndtheory solve` takes it"
         elif not dense:
             needed = f"needed at most {MOST_CONTACT_NODES} contact nodes for a body that contact alone holds"
-        elif body.motion_traces.shape[1] < k:
-            moves += " where no contact node feels it"
-            needed = "fix or prescribe more of its sides"
         else:
             continue
-        raise problem.refuse(name, None, f"{moves}: {needed}")
+        raise problem.refuse(name, None, f"{name} can move rigidly: {needed}")
 
 
 def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
@@ -287,8 +310,9 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
     TooManyContactNodes
         More than MOST_CONTACT_NODES of them, for dense interface matrices.
     ProblemError
-        Bodies that can move rigidly together, or do not meet, an interval outside the overlap or without nodes of
-        the contact body at its ends, Gamma_u holding the normal component of a contact node, an unreadable mesh.
+        A piece of a body that nothing holds, bodies that can move rigidly together, or do not meet, an interval outside
+        the overlap or without nodes of the contact body at its ends, Gamma_u holding the normal component of a contact
+        node, an unreadable mesh.
     """
     meshes = [None if spec.rigid else _mesh(problem, spec, name) for name, spec in _specs(problem)]
     for (name, _), mesh in zip(_specs(problem), meshes, strict=True):
@@ -308,6 +332,8 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
     bodies = TwoBodies(
         body1=body1, body2=body2, interface=interface, friction=problem.contact.friction, problem=problem
     )
+    for body in bodies.elastic:
+        _check_pieces(problem, body)
     if len(bodies.elastic) == 2 and _move_together(bodies):
         which = "bodies that touch" if problem.contact.lines else "body1 and body2"
         needed = f"{which} can move rigidly together, each held only by the other: fix or prescribe some sides"

@@ -14,7 +14,7 @@ from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.files import read_interface
 from verification.interface.friction import GivenOperator
 from verification.interface.interface import Grid, Interface, Law
-from verification.interface.matrices import check_matrix, check_nodes, real_array, size, stiffness
+from verification.interface.matrices import check_matrix, check_nodes, check_unit, real_array, size, stiffness
 from verification.interface.pair import ContactPair
 from verification.problem import Problem, load
 
@@ -52,8 +52,9 @@ def build(
         contact body it may be singular, where only contact holds it.
     load1, load2 : array, shapes (2 n1,), (2 n2,), optional
         Loads condensed onto the contact nodes; 0 by default.
-    x : array, shape (n,)
-        Positions of the contact nodes of the contact body, increasing.
+    x : array, shape (n,), optional
+        Positions of the contact nodes of the contact body, increasing.  Without friction they may be left out: they are
+        then 0, 1, .., and all weights 1, so that pressures are forces of nodes.
     weights : array, shape (n,), optional
         Weights of the quadrature on them; by default the trapezoid rule.
     gap : float or array, shape (n,)
@@ -88,7 +89,7 @@ def build(
     if problem is not None:
         if S1 is not None or S2 is not None:
             raise ValueError("received a problem and matrices: needed one of them")
-        if isinstance(problem, Problem) or Path(problem).suffix != ".npz":
+        if not isinstance(problem, (str, Path)) or Path(problem).suffix != ".npz":
             problem = problem if isinstance(problem, Problem) else load(problem)
             if friction is not None and not _varies(friction):
                 return pairs.pair_from(problem.changed(friction=friction), law=law)
@@ -98,27 +99,37 @@ def build(
             raise ValueError("received a law and an interface file: its operator S is a matrix already")
         pair = read_interface(Path(problem))
         return pair if friction is None else _rubbing(pair, friction)
-    if S1 is None or S2 is None or x is None:
-        raise ValueError("needed a problem, or S1, S2 and x")
+    if S1 is None or S2 is None:
+        raise ValueError("needed a problem, or S1 and S2")
+    rubs = law is not None or kernel is not None or (friction is not None and (_varies(friction) or friction != 0))
+    if x is None and rubs:
+        raise ValueError("needed x, the positions of the contact nodes, as there is friction")
     if neumann_body not in (1, 2):
         raise ValueError(f"neumann_body {neumann_body!r}: needed 1 or 2")
     if kernel is not None and law is not None:
         raise ValueError("received a kernel and a law: needed one of them")
     contact_name, neumann_name = ("S1", "S2") if neumann_body == 2 else ("S2", "S1")
+    S1, S2 = (real_array(name, S, (None, None), "a square matrix") for name, S in (("S1", S1), ("S2", S2)))
     for name, matrix in (("S1", S1), ("S2", S2)):
+        check_unit(name, matrix)
         if name == neumann_name:
-            check_matrix(name, np.asarray(matrix))
-        if len(matrix) % 2:
-            raise ValueError(f"{name} is {size(matrix)}: needed two components at each contact node")
+            check_matrix(name, matrix)
     lower, upper = (S1, load1), (S2, load2)
     (S_c, l_c), (S_n, l_n) = (lower, upper) if neumann_body == 2 else (upper, lower)
-    motions = stiffness(contact_name, np.asarray(S_c)).motions
+    motions = stiffness(contact_name, S_c).motions
+    for name, matrix in (("S1", S1), ("S2", S2)):
+        if len(matrix) % 2:
+            raise ValueError(f"{name} is {size(matrix)}: needed two components at each contact node")
     n, m = len(S_c) // 2, len(S_n) // 2
     if transfer is None and n != m:
         raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed the same contact nodes, or a transfer")
-    x = real_array("x", x, (n,))
-    w = trapezoid(x) if weights is None else real_array("weights", weights, (n,))
-    distance = real_array("gap", np.broadcast_to(gap, n), (n,))
+    if x is None:
+        x, even = np.arange(float(n)), np.ones(n)
+    else:
+        x = real_array("x", x, (n,))
+        even = trapezoid(x)
+    w = even if weights is None else real_array("weights", weights, (n,))
+    distance = real_array("gap", gap, (n,), alone=True)
     check_nodes(x, w)
     P = None if transfer is None else real_array("transfer", transfer, (n, m))
     grid = Grid(x=x, weights=w)
@@ -152,10 +163,9 @@ def pair_of(problem: Problem | ContactPair | Path | str) -> ContactPair:
 def _condensed(
     name: str, matrix: Floats, load: Floats | None, grid: Grid, motions: Floats | None, *, upward: bool
 ) -> Condensed:
-    S = np.array(matrix, dtype=float)
     condensed = Condensed(
         grid=grid,
-        schur=(S + S.T) / 2,
+        schur=(matrix + matrix.T) / 2,
         load=np.zeros(grid.size) if load is None else real_array(f"the load of the {name} body", load, (grid.size,)),
         known=np.zeros(grid.size),
         free=np.ones(grid.size, dtype=bool),

@@ -127,9 +127,8 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
     strain, strain_at = _strain(bodies, moved)
     strained: tuple[str, ...] = ()
     if strain > LARGE_STRAIN:
-        of_small = f"linear elasticity is for small strains, at most {100 * LARGE_STRAIN:g} %"
-        where = f"in the element at {_show(strain_at)}"
-        strained = (f"the largest principal strain is {100 * strain:.2g} %, {where}: {of_small}",)
+        above = f"above {100 * LARGE_STRAIN:g} %"
+        strained = (f"the largest principal strain is {100 * strain:.2g} % at {_show(strain_at)}, {above}",)
     if bodies.problem.dimension == 1:
         reason = {"penetration_outside": "bars meet at one point, which is Gamma_c"}
         return Checks(largest_strain=strain, strain_at=strain_at, reason=reason, warnings=strained)
@@ -153,7 +152,7 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
 
 
 def _show(place: Place | None) -> str:
-    return "" if place is None else f"({', '.join(f'{c:.6g}' for c in place)})"
+    return "" if place is None else f"({', '.join(f'{c:.4g}' for c in place)})"
 
 
 def _first_largest(values: Floats) -> int:

@@ -22,7 +22,15 @@ from verification.dense import pinned
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.friction import GivenOperator
 from verification.interface.interface import Grid, Interface, held_along
-from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, headers, real_array
+from verification.interface.matrices import (
+    ASYMMETRY,
+    UNREADABLE,
+    check_matrix,
+    check_nodes,
+    check_unit,
+    headers,
+    real_array,
+)
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.reading import at_least_one, factor, tolerance
@@ -31,9 +39,6 @@ from verification.problem.tables import TomlTable, choice, label, number, unread
 
 #: Largest size of an interface file, and of what it unpacks to: two matrices of 4000 rows, and what else there is.
 MOST_BYTES = 600_000_000
-
-#: Largest size of a number in an interface file.
-LARGEST = 1e60
 
 #: Names in every interface file.
 NEEDED = ("S1", "S2", "load1", "load2", "x", "weights", "gap", "friction", "neumann_body", "dimension")
@@ -120,19 +125,6 @@ def read_interface(path: Path) -> ContactPair:
         raise refuse("", str(error)) from None
 
 
-def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
-    """Raise ValueError for numbers of which a product of a few overflows a double, or vanishes."""
-    for name, array in arrays.items():
-        if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
-            continue
-        largest = float(np.abs(array.astype(float)).max(initial=0.0))
-        if largest > LARGEST:
-            raise ValueError(f"{name} has an entry of size {largest:.2g}: needed at most {LARGEST:g}, in another unit")
-        if name in ("S1", "S2") and 0 < largest < 1 / LARGEST:
-            needed = f"needed at least {1 / LARGEST:g}, in another unit"
-            raise ValueError(f"the largest entry of {name} is {largest:.2g}: {needed}")
-
-
 def _scalar(array: np.ndarray) -> Any:
     """Return a single value as a text or a whole number; several as a list, which every key refuses."""
     if array.shape != ():
@@ -146,25 +138,20 @@ def _scalar(array: np.ndarray) -> Any:
 
 
 def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
-    _check_sizes(arrays)
     texts = TomlTable({name: _scalar(arrays[name]) for name in SCALARS if name in arrays}, source)
     dimension: Literal[1, 2] = texts.take("dimension", choice(1, 2))
     neumann_body: Literal[1, 2] = texts.take("neumann_body", choice(1, 2))
-    x, n = arrays["x"], len(arrays["x"])
-    transfer = arrays.get("transfer")
+    x = real_array("x", arrays["x"], (None,))
+    n, transfer = len(x), arrays.get("transfer")
     grid = Grid(
-        x=real_array("x", x, (n,)),
-        weights=real_array("weights", arrays["weights"], (n,)),
-        dimension=dimension,
-        **_line(arrays, "", n),
+        x=x, weights=real_array("weights", arrays["weights"], (n,)), dimension=dimension, **_line(arrays, "", n)
     )
     other = grid
     if transfer is not None:
-        m = transfer.shape[-1]
-        transfer = real_array("transfer", transfer, (n, m))
-        unknown = np.full(m, np.nan)
+        transfer = real_array("transfer", transfer, (n, None))
+        m = transfer.shape[1]
         weights = real_array("weights_neumann", arrays.get("weights_neumann", transfer.T @ grid.weights), (m,))
-        x_neumann = np.array(arrays.get("x_neumann", unknown), dtype=float)
+        x_neumann = real_array("x_neumann", arrays["x_neumann"], (m,)) if "x_neumann" in arrays else np.full(m, np.nan)
         other = Grid(x=x_neumann, weights=weights, dimension=dimension, **_line(arrays, "_neumann", m))
     law = None
     if "kernel" in arrays:
@@ -214,9 +201,10 @@ def _side(arrays: dict[str, np.ndarray], i: int, grid: Grid) -> Condensed:
     if free.shape != size:
         raise ValueError(f"free{i}: needed {grid.size} truth values")
     stiffness = real_array(f"S{i}", arrays[f"S{i}"], (grid.size, grid.size))
+    check_unit(f"S{i}", stiffness)
     motions = arrays.get(f"motions{i}", NO_MOTIONS)
     if motions.size:
-        motions = real_array(f"motions{i}", motions, (grid.size, motions.shape[-1]))
+        motions = real_array(f"motions{i}", motions, (grid.size, None))
         scale = float(np.abs(stiffness).max())
         if motions[~free].any() or np.abs(motions.T @ motions - np.eye(motions.shape[1])).max() > ASYMMETRY:
             raise ValueError(f"motions{i}: needed orthonormal columns, 0 where free{i} is false")

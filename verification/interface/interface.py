@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
 from fem1d2d.trace import SAME
+from verification.interface.matrices import real_array
 from verification.problem.specs import Profile
 from verification.value import Value, freeze, lent
 
@@ -306,7 +307,8 @@ class Interface(Value):
             return None
         if self.law.of_contact and self.transfer is not None:
             raise ValueError(f"{self.law.words}: no operator on the Neumann grid")
-        return freeze(self.operator(self.law))
+        S = real_array("the operator S", self.operator(self.law), (self.contact.n, self.neumann.n))
+        return freeze(S)
 
     @property
     def shown(self) -> Interface:

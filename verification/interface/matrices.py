@@ -9,9 +9,11 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from numbers import Real
 from typing import IO, Any, BinaryIO
 
 import numpy as np
+import scipy.sparse as sp
 
 from fem1d2d.mesh import Floats
 from verification.threads import one_thread
@@ -19,6 +21,9 @@ from verification.value import Value
 
 #: Largest number of rows of a matrix, for a dense eigenvalue problem.
 MOST_ROWS = 4000
+
+#: Largest size of a number in an array: beyond, a product of a few overflows a double.
+LARGEST = 1e60
 
 #: Largest asymmetry of a matrix, relative to its largest entry, that counts as rounding.
 ASYMMETRY = 1e-8
@@ -39,26 +44,75 @@ UNREADABLE = (
 
 def size(matrix: np.ndarray) -> str:
     """Return the shape of an array in words."""
+    if matrix.ndim == 1:
+        return f"a vector of {len(matrix)}"
     return " x ".join(map(str, matrix.shape)) or "a single number"
 
 
-def real_array(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
-    """Return finite real numbers of a shape as an array.
+def real_array(
+    name: str,
+    values: Any,
+    shape: tuple[int | None, ...],
+    needed: str = "",
+    *,
+    alone: bool = False,
+    most: float = LARGEST,
+) -> Floats:
+    """Return the numbers that a user gave as a new array: whatever takes arrays from users reads them here.
+
+    Parameters
+    ----------
+    name : str
+        What errors call them.
+    values : array, sparse array, or sequences of numbers
+    shape : tuple of int or None
+        The shape that is needed; None stands for any length > 0.
+    needed : str
+        What errors say is needed, where it is more than real numbers of that shape.
+    alone : bool
+        True if a single number may stand for all entries.
+    most : float
+        Largest size of an entry.
 
     Raises
     ------
     ValueError
-        Another shape, texts or complex numbers, or an entry that is not finite.
+        Another shape, texts, complex numbers or truth values; an entry that is masked, not finite or larger.
     """
-    received, needed = np.asarray(values), " x ".join(map(str, shape))
-    if received.dtype.kind not in "fiubO":
-        raise ValueError(f"{name} has no real numbers (numpy type {received.dtype}): needed {needed} of them")
-    if received.shape != shape:
-        raise ValueError(f"{name} is {size(received)}: needed {needed} real numbers")
-    array = np.array(received, dtype=float)
+    needed = f"needed {needed or ' x '.join('any' if n is None else str(n) for n in shape) + ' real numbers'}"
+    if any(map(np.ma.is_masked, values if isinstance(values, (list, tuple)) else [values])):
+        raise ValueError(f"{name} has masked entries: {needed}")
+    try:
+        received = np.asarray(values.toarray() if sp.issparse(values) else values)
+    except ValueError:
+        raise ValueError(f"{name} has rows of different lengths: {needed}") from None
+    kind = received.dtype.kind
+    if kind not in "fiuO" or (kind == "O" and not all(isinstance(entry, Real) for entry in received.flat)):
+        raise ValueError(f"{name} has no real numbers (numpy type {received.dtype}): {needed}")
+    if alone and not received.ndim:
+        received = np.broadcast_to(received, [1 if n is None else n for n in shape])
+    fits = (n == length or (length is None and n) for n, length in zip(received.shape, shape, strict=False))
+    if received.ndim != len(shape) or not all(fits):
+        raise ValueError(f"{name} is {size(received)}: {needed}")
+    with np.errstate(over="ignore"):  # of extended precision
+        try:
+            array = np.array(received, dtype=float)
+        except OverflowError:  # a whole number beyond the doubles
+            array = np.full(received.shape, np.inf)
     if not np.isfinite(array).all():
-        raise ValueError(f"{name} has entries that are not finite: needed numbers")
+        raise ValueError(f"{name} has entries that are not finite: {needed}")
+    largest = max(float(array.max(initial=0.0)), -float(array.min(initial=0.0)))
+    if largest > most:
+        raise ValueError(f"{name} has an entry of size {largest:.2g}: needed at most {most:g}, in another unit")
     return array
+
+
+def check_unit(name: str, matrix: Floats) -> None:
+    """Raise ValueError for a matrix so small that products of a few of its entries vanish."""
+    if 0 < (largest := float(np.abs(matrix).max(initial=0.0))) < 1 / LARGEST:
+        raise ValueError(
+            f"the largest entry of {name} is {largest:.2g}: needed at least {1 / LARGEST:g}, in another unit"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -25,6 +25,7 @@ from verification.interface.assembly import (
 from verification.interface.body import Body, Condensed
 from verification.interface.interface import Grid, Interface, Law
 from verification.interface.joining import check_slopes
+from verification.interface.matrices import real_array
 from verification.problem import Problem, Settings
 from verification.problem.specs import MOST_FRICTION, Profile
 from verification.problem.steps import path_warnings
@@ -140,6 +141,8 @@ class ContactPair(Value):
         if self.interface.lines:
             raise ValueError("friction: needed a number, or a table in each [[contact]] of the file")
         s = [Fraction(at) for at in self.contact.grid.s.tolist()]
+        if isinstance(friction, np.ndarray) and friction.dtype.kind not in "OU":  # those may hold exact numbers
+            friction = real_array("friction", friction, (len(s),), f"a number for each of the {len(s)} contact nodes")
         values = [friction(float(at)) for at in s] if callable(friction) else np.asarray(friction).tolist()
         if not isinstance(values, list) or len(values) != len(s) or len(s) < 2:
             raise ValueError(f"friction: needed a number for each of the {len(s)} contact nodes, two or more")

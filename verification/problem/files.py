@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 from verification.problem.specification import Problem
-from verification.problem.tables import ProblemError, unreadable
+from verification.problem.tables import LARGEST, ProblemError, short, unreadable
 
 #: Largest size of a problem file.
 MOST_BYTES = 1_000_000
+
+#: Python reads no whole number of so many digits, and no decimal with an exponent of so many.
+LONG = re.compile(r"[\d_]{4301}|[eE][-+]?[\d_]{18}")
 
 
 def load(path: Path | str) -> Problem:
@@ -37,6 +41,10 @@ def load(path: Path | str) -> Problem:
         ...
     verification.problem.tables.ProblemError: nowhere.toml: no such file
     """
+    if not isinstance(path, (str, Path)):
+        raise ProblemError(
+            "", "", None, f"needed a problem, a pair or the path of a file, received {short(repr(path))}"
+        )
     data = read_file(path)
     if "grid" in data and "body1" not in data:
         needed = f"needed a problem file, this is the file of a sweep; type ndtheory sweep {path}"
@@ -69,5 +77,13 @@ def read_file(path: Path | str) -> dict[str, Any]:
         raise
     except UnicodeDecodeError:
         raise refused("a TOML text file is needed, this is not UTF-8 text") from None
-    except (RecursionError, ArithmeticError, ValueError) as error:
-        raise refused(f"not TOML: {' '.join(str(error).split()) or type(error).__name__}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise refused(f"not TOML: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        raise refused("not TOML: its tables or lists are too deep") from None
+    except (ArithmeticError, ValueError):  # of int and Decimal
+        line = next((n for n, line in enumerate(text.splitlines(), 1) if LONG.search(line)), None)
+        where = "" if line is None else f"line {line}: "
+        raise refused(
+            f"{where}a number has too many digits: needed numbers of a size up to {float(LARGEST):g}"
+        ) from None

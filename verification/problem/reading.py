@@ -341,6 +341,8 @@ def _read_parts(table: TomlTable, sides: tuple[str, ...] | None, dimension: int)
         if sides is not None and name in sides:
             raise table.refuse(name, None, "needed a name that no side has; known here: " + ", ".join(sides))
         part = table.table(name, required=True)
+        if "x" in part and "y" in part:
+            raise part.refuse("x", None, "needed the ends of a part along x or along y, received both")
         axis: Literal["x", "y"] = "y" if "y" in part else "x"
         side, reach = part.take("side", choice(*sides) if sides is not None else label), part.take(axis, ends)
         part.close()

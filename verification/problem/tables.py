@@ -12,7 +12,7 @@ from string import digits
 from typing import Any, TypeVar
 
 from ndtheory import exact
-from ndtheory.number import decimal
+from ndtheory.number import UnusualSize, decimal
 from ndtheory.texts import CONTROL, did_you_mean, nearest, printable
 
 V = TypeVar("V")
@@ -125,13 +125,16 @@ def number(
     def read(value: Any) -> Fraction:
         if isinstance(value, bool) or not isinstance(value, (int, float, str, Decimal, Fraction)):
             raise Unfit(f"needed {needed}")
+        of_size = f"needed {needed}, of a size between {float(least):g} and {float(LARGEST):g}"
         try:
             result = exact(value)
+        except UnusualSize as error:
+            raise Unfit(of_size if holds(error.near) else f"needed {needed}") from None
         except ValueError:
             unit = isinstance(value, str) and NUMBER_AND_UNIT.fullmatch(value)
             raise Unfit(f"needed {needed}" + NO_UNIT * bool(unit)) from None
         if result and not least <= abs(result) <= LARGEST:
-            raise Unfit(f"needed {needed}, of a size between {float(least):g} and {float(LARGEST):g}")
+            raise Unfit(of_size)
         if not (holds(result) and holds(Fraction(float(result)))):
             raise Unfit(f"needed {needed}")
         return result

@@ -246,8 +246,10 @@ def sweep(
     """
     if isinstance(problem, (Problem, ContactPair)):
         start = problem
+    elif Path(str(problem)).suffix == ".npz":
+        start = read_interface(Path(problem))
     else:
-        start = read_interface(Path(problem)) if Path(problem).suffix == ".npz" else load(problem)
+        start = load(problem)
     axes = {"theta": theta, "friction": friction, "young": young, "neumann_body": neumann_body, "refine": refine}
     grid = SweepGrid.of(axes | {"law": law, "radius": radius, "rule": rule}, start.source)
     place = None if store is None else Path(store)
