@@ -95,3 +95,18 @@ def test_a_line_that_faces_another_only_in_part_is_refused_with_the_place():
     assert other.seen_from(line).s[[0, -1]].tolist() == [0.0, 1.0]
     with pytest.raises(MeshError, match=r"does not face \(0.75, 0\)"):
         line.seen_from(other)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_normals_that_cross_before_they_meet_the_other_line_are_refused_whatever_the_size(size):
+    """The normals of a hollow arc meet at its centre: a line before it is seen in order, one behind it reversed."""
+    hollow = ring((size, 2 * size), (1.25 * np.pi, 1.75 * np.pi))
+    line = Line.along(hollow, "inner", left=False)
+    for level, crossed in ((-0.2, False), (0.2, True)):
+        flat = rectangle((-size, size), (level * size, (level + 1) * size), (4, 2))
+        other = Line.along(flat, "bottom", left=True)
+        if crossed:
+            with pytest.raises(MeshError, match="normals that cross near"):
+                line.seen_from(other)
+        else:
+            assert (np.diff(line.seen_from(other).s) > 0).all()
