@@ -256,6 +256,18 @@ def test_a_held_node_does_not_slide_however_hard_its_support_pushes():
     assert v.tolist() == [0, 2, 0, 0]
 
 
+def test_a_node_above_its_bound_that_has_not_moved_slides_the_way_it_is_pushed():
+    pattern = Pattern.of(np.array([0.0, 0, 0.5, 0, 0, 0]), np.array([2.0, -2, -2, 1, 1, 1]), np.ones(3), 1.0)
+    assert pattern.sliding.tolist() == [1, -1, 1]
+
+
+def test_a_pattern_equals_the_patterns_of_the_same_states_and_nothing_else():
+    pattern = Pattern.sticking(2, 2)
+    assert pattern == Pattern.sticking(2, 2)
+    assert pattern != Pattern(touching=pattern.touching, sliding=np.array([0, 1], dtype=np.int8))
+    assert pattern != pattern.key
+
+
 @pytest.mark.parametrize("way", [-1, 1])
 def test_where_the_bound_is_zero_both_ways_to_slide_are_right_and_the_guess_stays(way):
     """Its friction is 0 either way; to stick would be wrong."""

@@ -49,6 +49,19 @@ def test_a_body_that_friction_alone_holds_along_the_line_has_the_active_set_of_t
 
 
 @pytest.mark.parametrize("way", [-1, 1])
+def test_the_node_that_sticks_while_all_others_slide_is_found_without_the_program(way):
+    """Three nodes in a chain of springs, worked out by hand; a fourth one slides, and the motion does not move it."""
+    S = np.diag([1.0, 2, 1, 1, 2, 2, 2, 2])
+    S[[0, 1, 1, 2], [1, 0, 2, 1]] = -1
+    z = np.sqrt(np.array([1, 1, 1, 0, 0, 0, 0, 0])[:, None] / 3)
+    q = np.array([*(way * np.array([3, 0.5, -1.5, 3])), 1, 1, 1, 1])
+    found = ContactStep(S, np.ones(8, dtype=bool), 4, "active-set", motions=z).solve(q, np.ones(4))
+    assert found.pattern.sliding.tolist() == [way, way, 0, way]
+    assert found.v[:4] == pytest.approx(way * np.array([3.5, 1.5, 0, 2]), abs=1e-12)
+    assert found.force[:4] == pytest.approx(way * np.array([1, 1, 0, 1]), abs=1e-12)
+
+
+@pytest.mark.parametrize("way", [-1, 1])
 def test_a_body_that_the_loads_move_along_the_line_slides_as_a_whole(way):
     """Friction holds 2 and the loads are 5, so that no node sticks while the second one opens."""
     S, z = np.diag([1.0, 1, 2, 2]), np.sqrt([[0.5], [0.5], [0], [0]])
