@@ -48,6 +48,8 @@ def test_a_rational_lies_between_neighbouring_doubles(size, sign):
         {"value": 1.0, "lo": 0.0, "hi": math.nan, "level": "verified"},
         {"value": 1.0, "lo": 0.0, "hi": math.inf, "level": "verified"},
         {"value": 1.0, "lo": 0.5, "hi": 1.5, "level": "float"},
+        {"value": 1.0, "lo": 0.5, "level": "float"},
+        {"value": 1.0, "hi": 1.5, "level": "float"},
         {"value": 1.0, "level": "verified"},
         {"value": 1.0, "level": "exact"},
         {"value": 1.0, "lo": 0.5, "hi": 1.0, "level": "exact"},
@@ -346,7 +348,9 @@ def test_an_end_that_may_be_rounding_proves_no_interval():
     assert found.interval_proved is None
 
 
-@pytest.mark.parametrize("other", [0.3, Number.of_float(0.3), Number(value=0.3, lo=0.2, level="verified")])
+@pytest.mark.parametrize(
+    "other", [0.3, Number.of_float(0.3), *(Number(value=0.3, **{end: 0.3}, level="verified") for end in ("lo", "hi"))]
+)
 def test_one_constant_without_an_enclosure_leaves_all_results_without(other):
     rho = Number(value=2.0, lo=1.75, hi=2.25, level="verified")
     found = evaluate_energy(EnergyConstants(rho=rho, kappa_1=other), "1/4")
