@@ -58,6 +58,15 @@ def test_corners_pieces_and_closed_lines_are_refused_with_the_place():
         Line.along(joined("top", "bottom", "left", "right"), "line", left=True)
 
 
+def test_a_line_that_comes_back_to_a_node_ends_in_a_refusal():
+    """Two triangles that share a node: from there it goes round for ever."""
+    points = np.array([[0.0, 0], [-1, 1], [-1, -1], [1, -1], [1, 1]])
+    mesh = Mesh(points=points, cells=np.array([[0, 1, 2], [0, 3, 4]]), sides={})
+    for edges in (mesh.boundary, mesh.boundary[1:]):
+        with pytest.raises(MeshError, match=r"corner|pieces"):
+            Line.along(Mesh(points=points, cells=mesh.cells, sides={"line": edges}), "line", left=True)
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.7, 3.0])
 def test_the_gap_of_concentric_arcs_is_that_of_the_circles_not_of_their_chords(turn):
     inner = ring((1.0, 2.0), (0.2, 1.3), cells=(1, 11), turn=turn)

@@ -20,9 +20,12 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
+from functools import partial
 from pathlib import Path
 
 from safeguards.mission import EQUIVALENT, MISSION
+
+from fem1d2d.mesh_reader import limit
 
 ROOT = Path(__file__).parents[2]
 PAGE = "docs/verified.md"
@@ -31,6 +34,9 @@ HEAD = f"| module | {' | '.join(COLUMNS)} | on |\n|---|---|---|---|---|---|\n"
 
 #: Mutants of a module.
 DRAWN = 10
+
+#: Seconds of a processor and memory of the tests: a mutant may make a list longer for ever.
+LONGEST, MEMORY = 3600, 8 * 2**30
 
 TURNED = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Eq: ast.NotEq, ast.Is: ast.IsNot, ast.In: ast.NotIn}
 EXCHANGED = {"min": "max", "minimum": "maximum", "argmin": "argmax"}
@@ -119,8 +125,9 @@ def status(folder: Path, tests: Sequence[str], seconds: float | None = None) -> 
     alone = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST", "HYPOTHESIS"))}
     environment = alone | {"HYPOTHESIS_PROFILE": "ci", "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]
+    kept = {"cwd": folder, "env": environment, "capture_output": True, "preexec_fn": partial(limit, LONGEST, MEMORY)}
     try:
-        return subprocess.run(command, cwd=folder, env=environment, capture_output=True, timeout=seconds).returncode
+        return subprocess.run(command, timeout=seconds, **kept).returncode
     except subprocess.TimeoutExpired:
         return None
 
