@@ -2,6 +2,7 @@
 # make check  what CI runs: lint, types, tests, docs   make docs   the site, into docs/_build/html
 # make lowest a sample of the tests with the lowest versions that pyproject.toml allows; make newest with the newest
 # make nightly  the tests with many more random cases, PART=cli one part of them; notes in CONTRIBUTING.md what passed
+# make drawn  ten random changes of each module that the answers rest on: which do tests notice? MODULE=path/of.py one
 # make kratos the tests that couple two models in Kratos Multiphysics, with its wheels in an environment of their own
 # make paper  the paper with its numbers and figures: docs/_build/paper/paper.pdf
 # make release-check  what keeps this commit from being released: versions, changelog, tag, archives, site, notebooks
@@ -21,7 +22,7 @@ NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 # tests and pages would compile the packages anew), PYTHONPATH, PYTHONHASHSEED and all others that Python reads.
 unexport $(filter PYTHON%,$(filter-out PYTHON,$(.VARIABLES)))
 
-.PHONY: demo test check lint docs nightly lowest newest kratos paper bench release-check lock clean
+.PHONY: demo test check lint docs nightly drawn lowest newest kratos paper bench release-check lock clean
 .NOTPARALLEL:  # one pip at a time; pytest uses the processors itself
 
 demo: $(VENV)/.run
@@ -46,6 +47,9 @@ docs: $(VENV)/.docs
 
 nightly: $(VENV)/.test
 	$(BIN)/python .ci/nightly.py $(PART)
+
+drawn: $(VENV)/.test
+	PYTHONPATH=tests $(BIN)/python -m safeguards.drawn $(MODULE)
 
 # Each dependency has a test here that calls it.
 SAMPLE := fem1d2d/test_mesh_files.py ndtheory/test_gradient_descent.py ndtheory/test_symbolic.py cli/test_commands.py \

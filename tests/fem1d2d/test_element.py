@@ -32,6 +32,12 @@ def test_signed_measures_are_determinants_of_vertex_coordinates(mesh):
 
 
 @given(simplices)
+def test_the_volume_of_a_shape_function_is_its_row_of_the_mass_as_hat_functions_sum_to_one(mesh):
+    one = element.element_of(mesh)
+    assert (element.Element.volumes(one, mesh) == one.volumes(mesh)).all()
+
+
+@given(simplices)
 def test_hat_functions_are_one_at_their_vertex_and_zero_at_the_others(mesh):
     for p, gradients in zip(corners(mesh), element.gradients(mesh), strict=True):
         n = len(p)

@@ -58,6 +58,15 @@ def test_corners_pieces_and_closed_lines_are_refused_with_the_place():
         Line.along(joined("top", "bottom", "left", "right"), "line", left=True)
 
 
+def test_a_line_that_comes_back_to_a_node_ends_in_a_refusal():
+    """Two triangles that share a node: from there it goes round for ever."""
+    points = np.array([[0.0, 0], [-1, 1], [-1, -1], [1, -1], [1, 1]])
+    mesh = Mesh(points=points, cells=np.array([[0, 1, 2], [0, 3, 4]]), sides={})
+    for edges in (mesh.boundary, mesh.boundary[1:]):
+        with pytest.raises(MeshError, match=r"corner|pieces"):
+            Line.along(Mesh(points=points, cells=mesh.cells, sides={"line": edges}), "line", left=True)
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.7, 3.0])
 def test_the_gap_of_concentric_arcs_is_that_of_the_circles_not_of_their_chords(turn):
     inner = ring((1.0, 2.0), (0.2, 1.3), cells=(1, 11), turn=turn)
@@ -141,3 +150,18 @@ def test_tolerances_along_a_line_are_those_of_the_line_not_of_the_body():
     line, other = Line.along(lower, "top", left=False), Line.along(upper, "bottom", left=True)
     seen = line.facing(other).seen_from(other)
     assert seen.s == pytest.approx([0.0, 0.5e-8, 1e-8], rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_normals_that_cross_before_they_meet_the_other_line_are_refused_whatever_the_size(size):
+    """Half as steep as those of a hollow arc, they meet near a diameter above it: a line beyond would be reversed."""
+    hollow = ring((size, 2 * size), (1.25 * np.pi, 1.75 * np.pi))
+    line = Line.along(hollow, "inner", left=False)
+    for level, crossed in ((-0.2, False), (0.5, False), (1.5, True)):
+        flat = rectangle((-size, size), (level * size, (level + 1) * size), (4, 2))
+        other = Line.along(flat, "bottom", left=True)
+        if crossed:
+            with pytest.raises(MeshError, match="normals that cross near"):
+                line.facing(other)
+        else:
+            assert (np.diff(line.facing(other).seen_from(other).s) > 0).all()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem1d2d import bar, interval, largest_strains, plane_strain, rectangle, stresses, von_mises
+from fem1d2d import Material, bar, interval, largest_strains, plane_strain, rectangle, stresses, von_mises
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -34,6 +34,15 @@ def test_stresses_give_back_the_strains_by_the_compliance(seed):
     strain[:2, :2] = (gradient + gradient.T) / 2
     for stress in stresses(mesh, plane_strain(young, nu), mesh.points @ gradient.T + [3, 4]):
         assert ((1 + nu) * stress - nu * np.trace(stress) * np.eye(3)) / young == pytest.approx(strain, abs=1e-11)
+
+
+def test_each_cell_has_the_stress_of_its_own_material():
+    mesh, gradient = rectangle((0.0, 2.0), (-1.0, 0.0), (2, 1)), np.array([[0.1, 0.2], [0.3, -0.4]])
+    both, which = (plane_strain(2.0, 0.25), plane_strain(3.0, 0.4)), np.arange(len(mesh.cells)) % 2
+    found, *alone = (
+        stresses(mesh, material, mesh.points @ gradient.T) for material in (Material.of_cells(both, which), *both)
+    )
+    assert found == pytest.approx(np.array([alone[one][cell] for cell, one in enumerate(which)]), rel=1e-12)
 
 
 def test_a_bar_has_the_stress_of_each_cell_and_no_other():

@@ -11,6 +11,7 @@ from strategies import in_floats, lines, numbers, powers_of_two, renumbered, vec
 
 from fem1d2d import Mesh, MeshError, facing, interval, rectangle, surface, trapezoid
 from fem1d2d.assembly import facet_weights
+from fem1d2d.trace import extent
 
 counts = st.integers(1, 4)
 
@@ -22,6 +23,13 @@ def flat_bodies(draw):
     mesh = rectangle((0.0, float(width)), (0.0, float(height)), (draw(counts), draw(counts)))
     order = draw(st.permutations(range(len(mesh.points))))
     return renumbered(mesh, order), float(width), float(height)
+
+
+@pytest.mark.parametrize("far", [0.0, -10.0, 1e3])
+def test_the_extent_is_the_longest_side_wherever_the_body_lies(far):
+    for width, height in ((4.0, 1.0), (1.0, 4.0)):
+        assert extent(rectangle((far, far + width), (0.0, height), (2, 3))) == 4
+    assert extent(interval((far, far + 4), 3)) == 4
 
 
 @given(flat_bodies(), st.booleans())

@@ -48,6 +48,8 @@ def test_a_rational_lies_between_neighbouring_doubles(size, sign):
         {"value": 1.0, "lo": 0.0, "hi": math.nan, "level": "verified"},
         {"value": 1.0, "lo": 0.0, "hi": math.inf, "level": "verified"},
         {"value": 1.0, "lo": 0.5, "hi": 1.5, "level": "float"},
+        {"value": 1.0, "lo": 0.5, "level": "float"},
+        {"value": 1.0, "hi": 1.5, "level": "float"},
         {"value": 1.0, "level": "verified"},
         {"value": 1.0, "level": "exact"},
         {"value": 1.0, "lo": 0.5, "hi": 1.0, "level": "exact"},
@@ -323,7 +325,32 @@ def test_friction_that_may_vanish_spans_the_jump_from_rho_normal_to_rho():
     assert found.friction_multiple.level == "float", "without friction there is no largest multiple"
 
 
-@pytest.mark.parametrize("other", [0.3, Number.of_float(0.3), Number(value=0.3, lo=0.2, level="verified")])
+def known(value):
+    """A double that is what it says."""
+    return Number(value=float(value), lo=float(value), hi=float(value), level="exact")
+
+
+def test_an_interval_without_two_doubles_inside_is_not_proved():
+    """Friction one double below C2, where C6 and C1 meet."""
+    given = {"m": known(1), "M": known(2.5), "C_R": known(1)}
+    just_below = evaluate(REPAIRED, Constants(**given, C_K=known(0))).C2.lo
+    found = evaluate(REPAIRED, Constants(**given, C_K=known(just_below)))
+    assert found.interval[0] < found.interval[1]
+    assert found.interval_proved is None
+    further = evaluate(REPAIRED, Constants(**given, C_K=known(just_below * (1 - 1e-9)))).interval_proved
+    assert further[0] < further[1]
+
+
+def test_an_end_that_may_be_rounding_proves_no_interval():
+    """C1 is some 2e-80 here."""
+    found = evaluate(REPAIRED, Constants(m=known(1), M=known(1e20), C_R=known(1e20), C_K=known(0)))
+    assert found.interval == (0, pytest.approx(2e-80))
+    assert found.interval_proved is None
+
+
+@pytest.mark.parametrize(
+    "other", [0.3, Number.of_float(0.3), *(Number(value=0.3, **{end: 0.3}, level="verified") for end in ("lo", "hi"))]
+)
 def test_one_constant_without_an_enclosure_leaves_all_results_without(other):
     rho = Number(value=2.0, lo=1.75, hi=2.25, level="verified")
     found = evaluate_energy(EnergyConstants(rho=rho, kappa_1=other), "1/4")

@@ -101,6 +101,29 @@ def test_ends_that_differ_by_rounding_are_one_end(apart, roles):
     assert rows == pytest.approx(np.ones(len(rows)), rel=1e-12)
 
 
+NAMED = {"contact": {"surface": ["top", "bottom"]}}
+
+
+@pytest.mark.parametrize("tables", [{}, NAMED], ids=["along x", "named sides"])
+@pytest.mark.parametrize("cells", [4, 8])
+@pytest.mark.parametrize("roles", [1, 2])
+def test_blocks_drawn_into_each_other_have_their_depth_as_a_negative_gap_to_which_the_gap_of_the_file_is_added(
+    roles, cells, tables
+):
+    for depth, gap in (("1/32", "0"), ("1/32", "1/64"), ("1/32", "1/8"), ("-1/4", "1/8")):
+        high = {"y": [str(-Fraction(depth)), "1"], "cells": [cells, 2]}
+        data = changed(blocks(0, high=high, contact={"gap": gap}, iteration={"neumann_body": roles}), **tables)
+        assert set(gap_of(data)) == {float(Fraction(gap) - Fraction(depth))}
+
+
+@pytest.mark.parametrize("tables", [{}, NAMED], ids=["along x", "named sides"])
+def test_bodies_may_overlap_by_a_twentieth_of_the_smaller_height(tables):
+    drawn = lambda depth: changed(blocks(0, high={"y": [f"-{depth}", f"{2 - float(depth)}"]}), **tables)
+    assert set(gap_of(drawn("0.0499"))) == {-0.0499}
+    with pytest.raises(vf.ProblemError, match="needed an overlap of at most 5 %"):
+        gap_of(drawn("0.0501"))
+
+
 # --- obstacles --------------------------------------------------------------------------------------------------------
 
 RIGID = {"shape": "rigid"}

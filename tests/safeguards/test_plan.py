@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
-from processes import environment
+from safeguards.drawn import ROOT, copied, status
 from safeguards.plan import MUTANTS, TESTS, Mutant, mutants
 from strategies import AT_NIGHT
-
-ROOT = Path(__file__).parents[2]
 
 
 def test_each_mutant_changes_one_place():
@@ -43,28 +36,14 @@ def test_the_page_on_proved_constants_shows_the_share_that_is_defended():
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """The packages and the tests, to be changed."""
-    folder = tmp_path_factory.mktemp("mutants")
-    skipped = shutil.ignore_patterns("__pycache__", ".*")
-    for name in ("fem1d2d", "ndtheory", "verification", "tests"):
-        shutil.copytree(ROOT / name, folder / name, ignore=skipped)
-    shutil.copy(ROOT / "pyproject.toml", folder)
-    return folder
-
-
-def passes(folder: Path, tests: tuple[str, ...]) -> bool:
-    """True if these tests pass on this copy, each with the same drawn cases."""
-    env = environment(HYPOTHESIS_PROFILE="ci", PYTHONPATH=str(folder), PYTHONDONTWRITEBYTECODE="1")
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]
-    ended = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
-    assert ended.returncode in (0, 1), ended.stdout + ended.stderr
-    return ended.returncode == 0
+    """The project, to be changed."""
+    return copied(tmp_path_factory.mktemp("mutants"))
 
 
 @pytest.mark.skipif(not AT_NIGHT, reason="a run of tests for each mutant: by night")
 @pytest.mark.parametrize("module", MUTANTS)
 def test_the_tests_of_a_module_pass_without_a_mutant(copy, module):
-    assert passes(copy, TESTS[module])
+    assert status(copy, TESTS[module]) == 0
 
 
 @pytest.mark.skipif(not AT_NIGHT, reason="a run of tests for each mutant: by night")
@@ -74,6 +53,6 @@ def test_a_safeguard_that_is_taken_away_is_missed(copy, mutant: Mutant):
     text = path.read_text("utf-8")
     try:
         path.write_text(text.replace(mutant.before, mutant.after), "utf-8")
-        assert not passes(copy, TESTS[mutant.module])
+        assert status(copy, TESTS[mutant.module]) == 1
     finally:
         path.write_text(text, "utf-8")

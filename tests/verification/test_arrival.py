@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import verification as vf
-from verification.algorithm.ending import MOST, TOLERANCES, Ending, coupled_residual
+from verification.algorithm.ending import MOST, TOLERANCES, Ending, arrived, coupled_residual
 from verification.algorithm.rates import noise
 from verification.algorithm.start import tied_force
 
@@ -76,6 +76,48 @@ def test_the_coupled_residual_is_that_of_each_condition_at_each_node(data, step)
     back = lambda force: np.concatenate([P.T @ force[i : i + n] for i in range(0, t + n, n)])
     wanted = max([norm(off), *(norm(back(part)) for part in parts.values())]) / norm(iterate.g)
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-9)
+
+
+VIOLATIONS = ("an open node presses", "a node pulls", "friction exceeds its bound", "the contact body is not balanced")
+
+
+def violating(kind, share):
+    """A converged iterate of Section 6 with one condition violated at one node by so large a share of g, in (5.21)."""
+    pair = vf.build(vf.example("section6"))
+    last = vf.run(pair).last
+    g, neumann, grid = last.g, pair.neumann, pair.contact.grid
+    force, touching = last.contact.force.copy(), last.contact.pattern.touching.copy()
+    j = int(np.argmax(force[grid.normal]))
+    norm = lambda forces: neumann.dual_norm(pair.interface.carry_back(forces))
+    one = np.zeros(grid.size)
+    one[j + (grid.t if kind in VIOLATIONS[:2] else 0)] = 1.0
+    size = share * neumann.dual_norm(g) / norm(one)
+    off = np.zeros(len(g))
+    if kind == "an open node presses":
+        touching[j], force[grid.t + j] = False, size
+    elif kind == "a node pulls":
+        force[grid.t + j] = -size
+    elif kind == "friction exceeds its bound":
+        force[j] = pair.bound(g)[j] + size
+    else:
+        off[j] = share * neumann.dual_norm(g) / neumann.dual_norm(np.eye(len(g))[j])
+        force = force - pair.interface.spread(off)  # the traction of g is the same
+    contact = replace(last.contact, force=force, pattern=replace(last.contact.pattern, touching=touching))
+    return pair, replace(last, image=g - off, contact=contact)
+
+
+@pytest.mark.parametrize("kind", VIOLATIONS)
+def test_each_condition_that_is_violated_at_one_node_alone_is_seen_in_its_own_size(kind):
+    for share in (0.3, 2.0):
+        assert coupled_residual(*violating(kind, share)) == pytest.approx(share, rel=1e-6)
+
+
+@pytest.mark.parametrize(("tolerance", "most"), [(1e-9, MOST), (MOST / TOLERANCES, MOST), (0.05, 0.5)])
+def test_a_state_has_arrived_within_a_tenth_or_ten_times_the_tolerance_whichever_is_more(tolerance, most):
+    for share in (0.9, 1.1):
+        pair, iterate = violating("a node pulls", share * most)
+        asked = replace(pair, settings=replace(pair.settings, tolerance=tolerance))
+        assert arrived(asked, iterate) == (share < 1)
 
 
 def test_a_state_that_fails_does_not_end_a_run():

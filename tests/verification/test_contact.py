@@ -13,7 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from verification.contact import KKT, TOLERANCE, ContactError, ContactStep
-from verification.contact.active_set import ActiveSet, Pattern
+from verification.contact.active_set import ActiveSet, Pattern, Systems
 from verification.contact.kkt import KKTCertificate
 
 CONDITIONS = ("equilibrium", "non_penetration", "compression", "complementarity", "bound", "slip")
@@ -225,6 +225,66 @@ def test_a_held_node_does_not_move_and_asks_for_no_equilibrium(random):
         return
     assert (whole.v[~free] == 0).all()
     assert np.allclose(whole.v[rows], part.v, rtol=1e-9, atol=1e-11 * np.abs(part.v).max(initial=0))
+
+
+@pytest.mark.parametrize(("size", "turns"), [(1e-11, True), (1e-15, False)])
+@pytest.mark.parametrize("kind", ["pulls", "penetrates", "is pushed beyond its bound", "slips against its friction"])
+def test_a_sign_counts_far_below_the_tolerance_of_the_certificate_and_not_within_rounding(kind, size, turns):
+    """Two nodes without coupling, the first one pressed with 1; the second one is wrong by ``size``."""
+    touching, sliding, tangential, normal = True, 0, 0.0, 1.0
+    if kind == "pulls":
+        normal = -size
+    elif kind == "penetrates":
+        touching, normal = False, size
+    elif kind == "is pushed beyond its bound":
+        tangential = 1 + size
+    else:
+        sliding, tangential = 1, 1 - size
+    start = Pattern(touching=np.array([True, touching]), sliding=np.array([0, sliding], dtype=np.int8))
+    q = np.array([0.0, tangential, 1.0, normal])
+    _, _, pattern = ActiveSet(np.eye(4), np.ones(4, dtype=bool), 2).solve(q, np.ones(2), start)
+    assert (pattern != start) == turns
+
+
+def test_a_held_node_does_not_slide_however_hard_its_support_pushes():
+    """The support takes the force, which no friction bounds."""
+    free = np.array([False, True, True, True])
+    start = Pattern.sticking(2, 2)
+    v, force, pattern = ActiveSet(np.diag([0.0, 1, 1, 1]), free, 2).solve(np.array([5.0, 3, 1, 1]), np.ones(2), start)
+    assert pattern.sliding.tolist() == [0, 1]
+    assert force.tolist() == [5, 1, 1, 1]
+    assert v.tolist() == [0, 2, 0, 0]
+
+
+def test_a_node_above_its_bound_that_has_not_moved_slides_the_way_it_is_pushed():
+    pattern = Pattern.of(np.array([0.0, 0, 0.5, 0, 0, 0]), np.array([2.0, -2, -2, 1, 1, 1]), np.ones(3), 1.0)
+    assert pattern.sliding.tolist() == [1, -1, 1]
+
+
+def test_a_pattern_equals_the_patterns_of_the_same_states_and_nothing_else():
+    pattern = Pattern.sticking(2, 2)
+    assert pattern == Pattern.sticking(2, 2)
+    assert pattern != Pattern(touching=pattern.touching, sliding=np.array([0, 1], dtype=np.int8))
+    assert pattern != pattern.key
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_where_the_bound_is_zero_both_ways_to_slide_are_right_and_the_guess_stays(way):
+    """Its friction is 0 either way; to stick would be wrong."""
+    start = Pattern(touching=np.array([True]), sliding=np.array([way], dtype=np.int8))
+    asked = []
+    systems = Systems(np.eye(2), np.ones(2, dtype=bool))
+    solver = ActiveSet(np.eye(2), np.ones(2, dtype=bool), 1, systems=asking(systems, asked))
+    v, force, pattern = solver.solve(np.array([2.0, 3.0]), np.zeros(1), start)
+    assert (v[0], force[0]) == (2, 0)
+    assert asked == [pattern] == [start]
+
+
+def asking(systems: Systems, asked: list[Pattern]) -> Systems:
+    """The same systems; each pattern that is asked for is noted."""
+    of = systems.of
+    systems.of = lambda pattern: asked.append(pattern) or of(pattern)
+    return systems
 
 
 # --- by enumeration, in rationals -------------------------------------------------------------------------------------

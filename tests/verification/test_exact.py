@@ -12,8 +12,8 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.bounds import interior_point
 from verification.bounds.conditions import Pieces
-from verification.bounds.interior_point import Stop
-from verification.bounds.lipschitz import budget, enclose
+from verification.bounds.interior_point import LMIError, Stop
+from verification.bounds.lipschitz import Leaf, budget, enclose
 from verification.bounds.multipliers import QuadraticForms
 
 THETA = 0.7
@@ -115,6 +115,38 @@ def test_an_answer_is_the_same_each_time_and_more_programs_come_closer():
     assert more.programs > one.programs
     assert more.upper.value <= one.upper.value
     assert more.lower >= one.lower
+
+
+def leaves(tree):
+    """The sets of pieces into which all were divided."""
+    return [tree] if isinstance(tree, Leaf) else [leaf for part in tree.cases for leaf in leaves(part)]
+
+
+class Loose(QuadraticForms):
+    """Proofs that are worse for a part of the pieces than for all of them, as a solver's may be, or none."""
+
+    times: float
+
+    def on(self, pieces, theta, **given):
+        upper, proposal = super().on(pieces, theta, **given)
+        if pieces.key == self.everywhere.key:
+            return upper, proposal
+        if self.times == np.inf:
+            raise LMIError("no multipliers")
+        return replace(upper, value=self.times * upper.value), proposal
+
+
+@pytest.mark.parametrize("times", [2.0, np.inf])
+def test_what_is_proved_of_all_pieces_holds_for_a_part_of_which_less_is_proved(times):
+    pair = vf.build(two_blocks())
+    forms = Loose(pair, vf.measure(pair))
+    forms.times = times
+    found = enclose(pair, forms, 0.5, gap=1e-9, programs=7)
+    parts = leaves(found.tree)
+    assert len(parts) > 1
+    for leaf in parts:
+        assert leaf.upper.value == pytest.approx(found.whole.value, rel=1e-9)
+        assert leaf.proved_on.key == forms.everywhere.key  # its multipliers are for all signs
 
 
 def test_fewer_programs_are_allowed_the_larger_the_interface():

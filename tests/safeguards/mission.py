@@ -1,0 +1,56 @@
+"""Modules that constants, bounds, runs and their comparison rest on, and tests of them."""
+
+from __future__ import annotations
+
+
+def _tests(names: str) -> tuple[str, ...]:
+    return tuple(f"tests/{name.replace('/', '/test_')}.py" for name in names.split())
+
+
+#: The files of tests that are about each module, the one most likely to notice a change first.
+MISSION: dict[str, tuple[str, ...]] = {
+    f"{module}.py": _tests(tests)
+    for module, tests in {
+        "fem1d2d/assembly": "fem1d2d/assembly fem1d2d/uncoupled fem1d2d/polygons fem1d2d/condense",
+        "fem1d2d/condense": "fem1d2d/flexibility fem1d2d/condense fem1d2d/uncoupled verification/few_unknowns",
+        "fem1d2d/element": "fem1d2d/element fem1d2d/strain fem1d2d/assembly fem1d2d/material",
+        "fem1d2d/line": "fem1d2d/line verification/lines",
+        "fem1d2d/mesh": "fem1d2d/mesh fem1d2d/overlap fem1d2d/supports fem1d2d/outline",
+        "fem1d2d/pencil": "fem1d2d/bars fem1d2d/refinement fem1d2d/pencil",
+        "fem1d2d/supports": "fem1d2d/supports fem1d2d/refinement",
+        "fem1d2d/trace": "fem1d2d/transfer fem1d2d/trace",
+        "ndtheory/bounds": "ndtheory/bounds_hypotheses ndtheory/bounds ndtheory/enclosures",
+        "ndtheory/constants": "ndtheory/bounds_hypotheses ndtheory/energy_hypotheses ndtheory/enclosures",
+        "ndtheory/energy_norms": "safeguards/energy_safe ndtheory/energy_norms ndtheory/energy_hypotheses",
+        "ndtheory/number": "ndtheory/number ndtheory/enclosures",
+        "verification/algorithm/affine_piece": "verification/jacobian verification/margin",
+        "verification/algorithm/ending": "verification/arrival verification/iteration",
+        "verification/algorithm/fixed_point": "verification/lean_step verification/iteration verification/relaxation",
+        "verification/algorithm/linearisation": "verification/jacobian verification/prediction verification/margin",
+        "verification/algorithm/rates": "safeguards/rates_safe verification/rates",
+        "verification/algorithm/relaxation": "verification/relaxation verification/conformance",
+        "verification/algorithm/runs": "verification/iteration verification/results verification/held_by_contact",
+        "verification/bounds/conditions": "safeguards/multipliers_safe verification/lifted verification/exact",
+        "verification/bounds/interior_point": "verification/interior_point verification/exact",
+        "verification/bounds/lipschitz": "verification/mirror verification/exact verification/certificate_tree",
+        "verification/bounds/multipliers": "safeguards/multipliers_safe verification/multipliers verification/exact",
+        "verification/bounds/trace_forms": "verification/rounding_of_forms verification/rounding_of_forms_in_friction",
+        "verification/comparison": "verification/compare_bounds verification/verdicts cli/first_numbers",
+        "verification/constants/measuring": "verification/constants verification/energy_constants",
+        "verification/constants/operators": "verification/operators",
+        "verification/contact/active_set": "verification/rigid_motion verification/contact verification/lean_step",
+        "verification/contact/kkt": "safeguards/kkt verification/contact",
+        "verification/contact/step": "verification/rigid_motion verification/contact verification/held_by_contact",
+        "verification/contact/system": "verification/global verification/few_unknowns",
+        "verification/interface/body": "verification/response verification/few_unknowns verification/constants",
+        "verification/interface/friction": "verification/conformance verification/build verification/grids",
+        "verification/interface/interface": "verification/build verification/grids verification/conformance",
+        "verification/interface/joining": "safeguards/joining verification/drawn_geometry verification/lines",
+        "verification/interface/pair": "verification/build verification/relaxation verification/constants",
+        "verification/monolithic": "verification/global verification/checks verification/drawn_geometry",
+        "verification/verdicts": "verification/verdicts verification/verified_comparison",
+    }.items()
+}
+
+#: Drawn mutants by module, each with the reason why no test can notice it.
+EQUIVALENT: dict[str, dict[str, str]] = {}
