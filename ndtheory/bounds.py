@@ -281,7 +281,7 @@ class Bounds(Answer):
     threshold_on : {'k', 'C_K'}
         The constant to which C2 to C5 apply.
     why : str
-        Why there is no interval.
+        Reason for an interval of None.
     """
 
     edition: Edition
