@@ -281,7 +281,7 @@ class Bounds(Answer):
     threshold_on : {'k', 'C_K'}
         The constant to which C2 to C5 apply.
     why : str
-        Why there is no interval.
+        Reason for an interval of None.
     """
 
     edition: Edition
@@ -382,11 +382,13 @@ def evaluate(edition: Edition, constants: Constants, theta: Numeric | None = Non
 
 
 def _ends_of_C1(corners: list[dict[str, Any]]) -> list[Decimal | None]:
-    """Ends of an enclosure of C1: ends of the intervals; where there are none, C1 of D and Q at opposite ends."""
+    """Ends of an enclosure of C1: ends of the intervals; where there are none, C1 of D and Q at opposite ends.
+
+    C1 falls as Q grows, and does not fall as D grows, since Q >= 1 for m <= M and C_R >= 1.
+    """
     if all(corner["high"] is not None for corner in corners):
         return [corner["high"] for corner in corners]
-    pairs = zip(corners, reversed(corners), strict=True)
-    return [C1(one["D"], other["Q"]) if min(one["Q"], other["Q"]) > 1 else None for one, other in pairs]
+    return [C1(one["D"], other["Q"]) for one, other in zip(corners, reversed(corners), strict=True)]
 
 
 def _figures(edition: Edition, at: Corner, theta: Decimal | None, margin: Decimal) -> dict[str, Any]:

@@ -13,8 +13,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
-from ndtheory import EDITIONS, REPAIRED, Constants, EnergyConstants, HypothesisError, Number, evaluate, evaluate_energy
-from ndtheory.number import LEVELS, above, below, rounded, weakest, working_precision
+from ndtheory import (
+    EDITIONS,
+    PRINTED,
+    REPAIRED,
+    Constants,
+    EnergyConstants,
+    HypothesisError,
+    Number,
+    bounds,
+    evaluate,
+    evaluate_energy,
+)
+from ndtheory.number import LEVELS, above, below, decimal, rounded, weakest, working_precision
 
 LEVEL = st.sampled_from(LEVELS)
 ENCLOSED = st.sampled_from(["verified", "guaranteed"])
@@ -304,6 +315,31 @@ def test_C1_has_an_enclosure_on_both_sides_of_C2_and_beyond_it(edition):
         for i in range(21):
             at = F(ends[0]) + F(i, 20) * (F(ends[1]) - F(ends[0]))
             assert contains(found, evaluate(edition, Constants(m="1/2", M=2, C_R=2, C_K=at)).C1, "verified")
+
+
+@pytest.mark.parametrize("M", ["2", "7/3", "50/7"])
+def test_the_interval_that_is_proved_lies_inside_the_one_of_the_weakest_constants(M):
+    m, C_R = Number(value=1.0, lo=0.99, hi=1.01, level="verified"), F(4, 3)
+    least, A = F(0.99), F(M) * C_R
+    D, Q = (F(M) * A / least**2) ** 2, (A**2 * F(M) / least**3) ** 2
+    low, high = evaluate(REPAIRED, Constants(m=m, M=M, C_R=C_R, C_K=0)).interval_proved
+    assert low == 0
+    assert 0 < bounds.C1(D, Q) - F(high) < F(math.ulp(high)) * 2
+    known = evaluate(REPAIRED, Constants(m=least, M=M, C_R=C_R, C_K=0))
+    friction = (known.C4.value + known.C2.value) / 2
+    largest = max(F(friction), F(str(friction)))  # a double is read as its shortest decimal
+    rubs = Number(value=friction, lo=friction * 0.99, hi=friction, level="verified")
+    low, high = evaluate(REPAIRED, Constants(m=m, M=M, C_R=C_R, C_K=rubs)).interval_proved
+    with working_precision():
+        worst = bounds.C6(bounds.P(decimal(largest), *map(decimal, (least, F(M), C_R, least))))
+        assert 0 < Decimal(low) - worst < Decimal(math.ulp(low)) * 2
+
+
+@pytest.mark.parametrize(("lo", "proved"), [(1.0, True), (0.99, False)])
+def test_the_printed_proof_holds_for_all_coercivities_enclosed_or_is_not_called_a_proof(lo, proved):
+    m = Number(value=1.005, lo=lo, hi=1.01, level="verified")
+    assert evaluate(PRINTED, Constants(m=m, M=3, C_R=1, C_K=0)).proved is proved
+    assert evaluate(REPAIRED, Constants(m=m, M=3, C_R=1, C_K=0)).proved
 
 
 def test_theta_must_be_inside_the_interval_throughout_for_an_enclosure_of_the_factor():

@@ -108,3 +108,13 @@ def test_each_reason_says_what_is_missing():
         **dict.fromkeys(["interval", "theta_proved", "factor_proved", "theta_max_proved"], "q >= 1 for every theta"),
         **dict.fromkeys(["factor", "one_minus_factor"], outside),
     }
+
+
+@pytest.mark.parametrize(("excess", "verdict"), [(F(1, 10**101), "no conclusion"), (-F(1, 10**101), "contraction")])
+def test_a_theta_where_q_exceeds_1_does_not_contract_though_it_lies_beside_the_interval_by_less_than_the_margin(
+    excess, verdict
+):
+    """Beyond kappa_2 = 1 the interval begins near the excess, which counts as 0 where the ends are compared."""
+    found = evaluate_energy(EnergyConstants(rho=1, kappa_2=1 + excess), F(1, 10**105))
+    assert found.interval[0] == 0
+    assert found.verdict == verdict

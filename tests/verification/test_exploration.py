@@ -155,8 +155,15 @@ def test_a_pair_of_matrices_is_refused():
         vf.explore(pair)
 
 
-def test_a_title_does_not_end_the_script():
-    bars = vf.example("two-bars").to_dict() | {"title": "</script><b>x</b>"}
+def test_the_friction_terms_of_the_page_are_those_at_friction_1(found, data):
+    for role, film in zip(data["roles"], found.films, strict=True):
+        at_1 = film.measured.with_friction(1.0).energy_constants()
+        assert role["kappa"] == pytest.approx([float(at_1.kappa_1), float(at_1.kappa_2)], rel=1e-12)
+
+
+def test_texts_of_a_problem_do_not_end_the_script():
+    ending = "</script><b>x</b>"
+    bars = vf.example("two-bars").to_dict() | {"title": ending, "units": {"length": ending, "stress": "MPa"}}
     page = vf.explore(vf.Problem.from_dict(bars)).page()
     assert "</script><b>" not in page
     assert page.count("</script>") == 4

@@ -122,6 +122,9 @@ def test_a_theta_or_a_friction_that_the_multipliers_do_not_prove_is_refused():
     assert theta < 0.9
     assert 0.999 * theta < confirmation.theta_max(theta, found.largest) <= F(theta)
     assert 0.999 * k < confirmation.friction_threshold(k, twice) <= F(k)
+    for share in (0.9, 0.8):  # far below: what is rounded up would be confirmed too
+        assert confirmation.theta_max(share * theta, found.largest) <= F(share * theta)
+        assert confirmation.friction_threshold(share * k, twice) <= F(share * k)
     with pytest.raises(NoCertificate, match="not confirmed"):
         confirmation.theta_max(1.02 * theta, found.largest)
     with pytest.raises(NoCertificate, match="not confirmed"):
