@@ -156,8 +156,8 @@ def test_a_pair_of_matrices_is_refused():
 
 
 def test_the_friction_terms_of_the_page_are_those_at_friction_1(found, data):
-    for role, film in zip(data["roles"], found.films, strict=True):
-        at_1 = film.measured.with_friction(1.0).energy_constants()
+    for role, each in zip(data["roles"], found.films, strict=True):
+        at_1 = each.measured.with_friction(1.0).energy_constants()
         assert role["kappa"] == pytest.approx([float(at_1.kappa_1), float(at_1.kappa_2)], rel=1e-12)
 
 
