@@ -37,11 +37,14 @@ class Line:
         Their coordinates.
     normals : array, shape (n, 2)
         Unit normals on the left of the line: the bisectors of its corners, at an end the normal of the edge.
+    images : pair of array, shape (2,), or None
+        The next points beyond both ends, where the line goes on as its mirror image.
     """
 
     nodes: Ints
     points: Floats
     normals: Floats
+    images: tuple[Floats | None, Floats | None] = (None, None)
 
     @classmethod
     def along(cls, mesh: Mesh, side: str, *, left: bool, mirrored: NDArray[np.bool_] | None = None) -> Line:
@@ -65,14 +68,17 @@ class Line:
         nodes = _chained(mesh, edges if left else edges[:, ::-1], side)
         points = mesh.points[nodes].astype(float)
         steps = np.diff(points, axis=0)
-        steps /= np.linalg.norm(steps, axis=1)[:, None]
+        lengths = np.linalg.norm(steps, axis=1)
+        steps /= lengths[:, None]
         before, after = np.vstack([steps[:1], steps]), np.vstack([steps, steps[-1:]])
+        images: list[Floats | None] = [None, None]
         if mirrored is not None:
             for end, edge in ((0, before), (-1, after)):
                 held = mirrored[nodes[end]]
                 image = np.where(held, 1.0, -1.0) * steps[end]
                 if held.sum() == 1 and image @ steps[end] > np.cos(np.radians(SHARPEST)):
                     edge[end] = image
+                    images[end] = points[end] + (image if end else -image) * lengths[end]
         turn = np.degrees(np.arctan2(_cross(before, after), (before * after).sum(axis=1)))
         sharp = int(np.argmax(np.abs(turn)))
         if abs(turn[sharp]) > SHARPEST:
@@ -81,7 +87,8 @@ class Line:
                 f" {abs(turn[sharp]):.3g} degrees: needed at most {SHARPEST:g}; cut it there, or mesh a curve finer"
             )
         tangents = before + after
-        return cls(nodes=nodes, points=points, normals=_directions(np.stack([-tangents[:, 1], tangents[:, 0]], axis=1)))
+        normals = _directions(np.stack([-tangents[:, 1], tangents[:, 0]], axis=1))
+        return cls(nodes=nodes, points=points, normals=normals, images=(images[0], images[1]))
 
     @cached_property
     def s(self) -> Floats:
@@ -139,6 +146,16 @@ class Line:
             raise MeshError(f"is met by normals that cross near {_at(self.points[back])}")
         return Line(nodes=between.nodes[kept], points=between.points[kept], normals=between.normals[kept])
 
+    def curve(self, s: Floats) -> Floats:
+        """Points on the smooth curve through the nodes at positions, shape (len(s), 2)."""
+        known, points = self.s, self.points
+        for end, image in zip((0, -1), self.images, strict=True):
+            if image is not None:
+                step = (1 if end else -1) * float(np.linalg.norm(points[end] - image))
+                at = len(known) if end else 0
+                known, points = np.insert(known, at, known[end] + step), np.insert(points, at, image, axis=0)
+        return smooth(known, points, s)
+
     def seen_from(self, other: Line) -> Seen:
         """Find where the normals of this line, as :meth:`facing` returns it, meet another one.
 
@@ -150,7 +167,7 @@ class Line:
         met, faces = self._meetings(other)
         if not faces.all():
             raise MeshError(f"does not face {_at(self.points[np.argmin(faces)])}")
-        gap = ((smooth(other.s, other.points, met) - self.points) * self.normals).sum(axis=1)
+        gap = ((other.curve(met) - self.points) * self.normals).sum(axis=1)
         return Seen(gap=gap, s=_onto(other.s, met, self.s))
 
     def _meetings(self, other: Line) -> tuple[Floats, NDArray[np.bool_]]:

@@ -7,9 +7,11 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from mesh_writer import read_here, write_gmsh22
 from scipy.linalg import eigh
 
 import verification as vf
+from fem1d2d import mesh_files, rectangle
 from verification.interface.files import read_interface, write_interface
 from verification.problem import ProblemError
 
@@ -99,6 +101,36 @@ def test_half_a_model_has_the_stresses_of_the_whole_one_by_both_methods(name):
     assert abs(one.iterations - other.iterations) <= 1  # the residual of the last step is rounding
     compared(one.contact, other.contact)
     compared(one.contact, vf.solve(half).contact)
+
+
+def arcs(folder, *, half, cells, curvature, friction="0.3", law="nonlocal"):
+    """The same with curved sides that are joined by their names."""
+    drawn = []
+    for name, width, n, low, high in (
+        ("low", 1.0, cells[0], lambda x: 0 * x - 0.5, lambda x: curvature * x * x),
+        ("up", 0.8, cells[1], lambda x: 0.15 * x * x, lambda x: 0 * x + 0.6),
+    ):
+        flat = rectangle((0.0 if half else -1.0, 1.0), (0.0, 1.0), (n if half else 2 * n, 2))
+        x, t = width * flat.points[:, 0], flat.points[:, 1]
+        points = np.column_stack([x, (1 - t) * low(x) + t * high(x)])
+        write_gmsh22(folder / f"{name}-{half}.msh", points, flat.cells, flat.sides)
+        drawn.append({"mesh": str(folder / f"{name}-{half}.msh"), "poisson": "0.3", "prescribed": AXIS if half else {}})
+    drawn[1]["prescribed"] = {"top": [0, "-0.02"]} | drawn[1]["prescribed"]
+    return vf.Problem.from_dict({
+        "body1": drawn[0] | {"young": 70000, "fixed": ["bottom"]},
+        "body2": drawn[1] | {"young": 20000},
+        "contact": {"surface": ["top", "bottom"], "friction": friction, "radius": "0.15", "law": law},
+        "iteration": {"neumann_body": 1, "theta": "0.5", "tolerance": 1e-13},
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("given", [((8, 6), -0.2), ((6, 10), -0.2), ((6, 4), 0.1), ((8, 8), 0.0)], ids=str)
+def test_half_of_curved_bodies_has_the_stresses_of_the_whole_ones(given, tmp_path, monkeypatch):
+    """Also where the curve through the nodes of the other body is evaluated beside the axis."""
+    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+    half, whole = (arcs(tmp_path, half=half, cells=given[0], curvature=given[1]) for half in (True, False))
+    compared(vf.solve(half).contact, vf.solve(whole).contact)
+    compared(vf.run(half).contact, vf.run(whole).contact)
 
 
 @strategies.fewer(2)
