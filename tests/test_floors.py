@@ -141,6 +141,7 @@ INSIDE = (
     ("verification.cli", "verification", "the command starts without arrays"),
     ("verification.cli", "ndtheory", "the command starts with what the calculator needs"),
     ("verification.cli.main", "importlib.metadata", "only a fault asks where to report it"),
+    ("verification.cli.main", "fem1d2d", "only an error asks whether it is one of a mesh: numpy"),
     ("verification.cli", "tomllib", "one command in ten reads a file"),
     ("verification.cli.main", "fem1d2d", "the command starts without arrays"),
     ("verification.cli.console", "rich", "only progress needs it"),

@@ -75,3 +75,10 @@ def test_bad_files_get_one_line(call, files, monkeypatch, words, parts):
     monkeypatch.chdir(files)
     complaint = call("advise", "vectors", *words).complaint
     assert [part for part in parts if part not in complaint] == []
+
+
+def test_the_same_file_for_iterates_and_images_is_refused_in_one_line(call, tmp_path):
+    path = tmp_path / "X.npy"
+    np.save(path, np.random.default_rng(7).normal(size=(5, 3)))
+    complaint = call("advise", "vectors", path, path).complaint
+    assert "X.npy: T x = x for every iterate, up to rounding: each is a solution already, or X was given" in complaint

@@ -256,3 +256,11 @@ def test_a_wrong_sign_is_told_where_the_end_is_printed():
     found = vf.couple(lambda g: g / 2, lambda u: 3 + 0.5 * u, start=0.0)
     assert found.converged
     assert "but all eigenvalues are negative: one solver probably has the wrong sign" in found.summary
+
+
+def test_a_coupling_has_diverged_only_where_five_changes_have_grown():
+    """The change grows by 1.2 a step; with fewer than five of them it may be a transient."""
+    cut = lambda n: vf.couple(
+        lambda g: g, lambda u: 1 - 3.4 * u, start=0.0, rule="constant", theta=0.5, max_iterations=n
+    )
+    assert [cut(n).diverged for n in range(1, 8)] == [False] * 4 + [True] * 3

@@ -14,7 +14,7 @@ from sample_runs import converged
 
 import verification as vf
 from verification.interface.assembly import discretise
-from verification.monolithic import ContactSystem, contact_system
+from verification.monolithic import ContactSystem, SolveError, contact_system
 
 REFERENCE = Path(__file__).parent / "reference_local_coulomb.csv"
 
@@ -335,3 +335,29 @@ def test_two_obstacles_are_no_problem_to_solve() -> None:
     problem = plates() | {name: {"shape": "rigid"} for name in ("body1", "body2")}
     with pytest.raises(vf.ProblemError, match="at least one elastic body"):
         vf.Problem.from_dict(problem)
+
+
+# --- numbers beyond the doubles ---------------------------------------------------------------------------------------
+
+
+def test_no_state_with_a_number_that_is_none_has_a_certificate() -> None:
+    system = ContactSystem(np.eye(2), np.array([0.0, 1.0]), np.array([[math.nan]]))
+    assert math.isnan(system.residual(np.array([0.0, 1.0]), np.zeros(0)))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("sizes", [(1e290, 1.0, 1e9), (1.0, 1e300, 1e9), (1.0, 1.0, 1e300), (1e-300, 1e150, 1.0)])
+def test_a_system_of_any_size_is_solved_with_its_certificate_or_refused_without_a_warning(sizes) -> None:
+    stiff, far, rough = sizes
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        n = random.integers(1, 4)
+        root = random.normal(size=(2 * n, 2 * n))
+        system = ContactSystem(
+            stiff * root @ root.T, far * random.normal(size=2 * n), rough * random.normal(size=(n, n))
+        )
+        try:
+            found = system.solve()
+        except SolveError:
+            continue
+        assert np.isfinite(found.force).all()

@@ -232,10 +232,9 @@ def _tracker() -> str:
 
 def _explain(error: BaseException) -> int:
     """Bad input in one line; anything else is a bug and says so."""
-    from fem1d2d import MeshError
     from verification.problem.tables import ProblemError
 
-    if isinstance(error, (ProblemError, HypothesisError, MeshError, click.ClickException)):
+    if isinstance(error, (ProblemError, HypothesisError, click.ClickException)):
         complain(f"ndtheory: {error}")
         return BAD_INPUT
     if isinstance(error, OSError):
@@ -243,6 +242,11 @@ def _explain(error: BaseException) -> int:
         return BAD_INPUT
     if isinstance(error, MemoryError):
         complain("ndtheory: the problem does not fit into memory; needed fewer cells")
+        return BAD_INPUT
+    from fem1d2d import MeshError  # numpy: only now
+
+    if isinstance(error, MeshError):
+        complain(f"ndtheory: {error}")
         return BAD_INPUT
     for line in traceback.format_exc().splitlines():
         complain(line)
