@@ -182,9 +182,9 @@ class Line:
         start, along = other.points[:-1, None], np.diff(other.points, axis=0)[:, None]  # (edges, 1, 2)
         tangents = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
         rise = (along * tangents).sum(axis=2)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             place = ((points - start) * tangents).sum(axis=2) / rise
-        beyond = max(self.slack, other.slack) / np.linalg.norm(along, axis=2)
+            beyond = max(self.slack, other.slack) / np.linalg.norm(along, axis=2)
         meets = (rise > 0) & (place >= -beyond) & (place <= 1 + beyond)
         place = np.clip(np.where(meets, place, 0.0), 0.0, 1.0)
         far = np.abs(((start + place[..., None] * along - points) * normals).sum(axis=2))
