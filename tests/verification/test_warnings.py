@@ -229,6 +229,19 @@ def test_a_built_in_file_with_friction_says_that_its_law_is_static(name):
     assert "static: right for one monotone loading, not for unloading" in examples()[name]
 
 
+@pytest.mark.parametrize("nodes", [60, 190, 666])
+def test_the_file_of_a_mesh_of_the_paper_says_what_its_radius_is_against_the_mesh_width(nodes):
+    text = examples()[f"section6-{nodes}"]
+    bodies = discretise(vf.example(f"section6-{nodes}"))
+    width = float(np.diff(bodies.interface.neumann.x).max())
+    even = bodies.interface.kernel @ bodies.interface.neumann.weights
+    assert ("half the lower body's mesh width" in text) == (width == pytest.approx(0.2)) == (nodes == 60)
+    assert ("between the mesh width and 0.3 times the length of Gamma_c" in text) == (width < 0.1 + 1e-9)
+    narrow = "sees single nodes and multiplies the friction bound of a node by 0.00 to 2.00"
+    assert any(narrow in warning for warning in bodies.warnings) == (nodes == 60)
+    assert (even.min() == pytest.approx(0) and even.max() == pytest.approx(2)) == (nodes == 60)
+
+
 def test_the_page_gives_the_borders_of_the_warnings():
     assert f"From {LOCKING} on a warning is given" in PAGE
     assert f"below ${3 * SHARE:.1g}\\,\\ell$" in PAGE
