@@ -196,6 +196,13 @@ def test_a_bound_that_is_not_coulombs_is_warned_of_with_its_range_and_coulombs_f
     assert carried["local"] > 2
 
 
+@pytest.mark.parametrize("cells", [(16, 8), (14, 2), (6, 7)])
+def test_an_even_pressure_is_bounded_as_coulomb_has_it_by_the_local_law_on_any_grids(cells):
+    interface = discretise(tipping("local", cells)).interface
+    assert (interface.transfer is None) == (cells == (16, 8))
+    assert interface.kernel @ interface.neumann.weights == pytest.approx(np.ones(interface.contact.n), rel=1e-12)
+
+
 def test_a_run_that_converged_says_the_same_as_the_solution():
     run, solution = vf.run(tipping("local", push="0.01")), vf.solve(tipping("local", push="0.01"))
     assert run.converged
