@@ -143,7 +143,6 @@ INSIDE = (
     ("verification.cli", "tomllib", "one command in ten reads a file"),
     ("verification.cli.console", "rich", "only progress needs it"),
     ("verification.cli.console", "ctypes", "only diverting a stream needs it"),
-    ("verification.bounds.bound", "numpy", "the calculator has bounds and no arrays"),
     ("verification.bounds.table", "verification.bounds", "the calculator has bounds and no arrays"),
     ("verification.ledger.rows", "verification.ledger.sources", "records are read without sympy, which takes a second"),
     ("verification.output.folder", "verification.figures", "matplotlib is loaded once there is something to draw"),
