@@ -395,7 +395,7 @@ def enclosed_ratio(
         while parts:
             lo, hi, a, b = parts.pop()
             scales = [ball((lo + hi) / 2 if lo else Fraction(1)).sqrt() ** power for power in POWERS]
-            if _at_most(most, a.on(lo, hi), b.on(lo, hi), scales, normal):
+            if at_most(most, a.on(lo, hi), b.on(lo, hi), scales, normal):
                 continue
             if not lo or hi - lo < lo * SHORTEST:
                 raise Unproved(f"a bound of {float(most):g} for waves of {float(lo):g} to {float(hi):g}")
@@ -437,7 +437,7 @@ def _schur(c: Any) -> Any:
     return NN - TN.transpose() * TT.solve(TN)
 
 
-def _at_most(most: Any, contact: Poly, neumann: Poly, scales: Sequence[Any], normal: bool) -> bool:
+def at_most(most: Any, contact: Poly, neumann: Poly, scales: Sequence[Any], normal: bool) -> bool:
     """True if ``s_c <= most s_n`` is proved for the symbols enclosed by two polynomials."""
     factors = most * (1 - ball(EPSILON)), -(1 + ball(EPSILON))
     if not normal:

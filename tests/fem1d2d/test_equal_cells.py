@@ -295,3 +295,25 @@ def test_a_polynomial_is_positive_only_if_it_is_at_both_ends_and_between():
         assert not layers_proved.positive(scalar(1, 1.1), one)
         assert not layers_proved.positive(scalar(1, 0, -1.1), one)
         assert not layers_proved.positive([arb_mat([[1, 2], [2, 1]])], one * 2)
+
+
+def test_a_ratio_of_normal_stiffness_is_proved_only_where_the_tangential_block_is_positive_as_the_proof_needs():
+    """Components in turn tangential and normal; with a negative block the condensed form bounds no least energy."""
+    with ctx.workprec(BITS):
+        diagonal = lambda *values: [arb_mat(np.diag(values).tolist())]
+        proved = lambda tangential: layers_proved.at_most(
+            layers_proved.arb(1), diagonal(0.5, 0.5, 0.5, 0.5), diagonal(tangential, 1.0, tangential, 1.0),
+            [layers_proved.arb(1)] * 4, normal=True,
+        )  # fmt: skip
+        assert proved(1.0)
+        assert not proved(-1.0)
+        assert not proved(0.1)  # the residual is weighed by an eighth
+
+
+def test_a_part_that_is_not_linear_counts_whatever_its_sign_and_place():
+    with ctx.workprec(BITS):
+        two = [layers_proved.arb(1)] * 2
+        form = lambda *values: [arb_mat([[float(a), float(b)], [float(b), float(a)]]) for a, b in values]
+        assert layers_proved.positive(form((1, 0), (0, 0), (0, 0.5)), two)
+        assert not layers_proved.positive(form((1, 0), (0, 0), (0, 1.1)), two)
+        assert not layers_proved.positive(form((1, 0), (0, 0), (0, 0), (0, 1.1)), two)

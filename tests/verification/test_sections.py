@@ -178,6 +178,13 @@ def test_an_interval_that_is_proved_is_rounded_inwards():
     assert numbers.interval(None, "float") == "-"
 
 
+@pytest.mark.parametrize("number", [0, 7, 123456])
+def test_a_count_keeps_all_its_digits_and_the_words_before_it(number):
+    assert numbers.count(number) == Quantity(number, str(number))
+    assert numbers.count(number, "<= ") == Quantity(number, f"<= {number}")
+    assert numbers.count(None, "<= ") == numbers.NONE
+
+
 # --- one title, one place ---
 
 

@@ -205,6 +205,49 @@ def test_ends_of_exchanged_roles_are_reciprocal():
         one.with_open_nodes().exchanged()
 
 
+def test_eigenvalues_are_sorted_and_modes_between_two_ends_are_the_extrema_of_a_chebyshev_polynomial():
+    assert Spectrum.of([8.0, 0.5, 2.0]).values.tolist() == [0.5, 2.0, 8.0]
+    assert Spectrum.of([8.0, 0.5, 2.0]).source == "eigenvalues"
+    between = Spectrum.between(1.0, 3.0)
+    x = between.values.real - 2
+    assert (between.low, between.high) == (1.0, 3.0)
+    assert np.polynomial.Chebyshev.basis(len(x) - 1)(x) == pytest.approx((-1.0) ** np.arange(len(x))[::-1])
+
+
+@pytest.mark.parametrize(("imaginary", "real"), [(0.019, True), (0.021, False)])
+def test_a_spectrum_is_complex_from_a_fiftieth_of_the_largest_eigenvalue_of_1_plus_H_on(imaginary, real):
+    assert Spectrum.of([1.0 + imaginary * 5j, 1.0 - imaginary * 5j, 4.0]).real == real
+
+
+def test_errors_of_exchanged_roles_are_those_of_one_over_each_end():
+    one = Spectrum(values=np.array([0.5, 8.0], complex), source="vectors", error_low=1e-6, error_high=1e-4)
+    other = one.exchanged()
+    assert other.error_low == pytest.approx(1 / 8 - 1 / (8 + 1e-4), rel=1e-4)
+    assert other.error_high == pytest.approx(1 / 0.5 - 1 / (0.5 + 1e-6), rel=1e-4)
+    assert other.source == "vectors"
+
+
+def test_a_mode_of_open_nodes_is_exact_and_is_added_once():
+    one = Spectrum(values=np.array([0.5, 8.0], complex), source="vectors", error_low=0.1, error_high=0.2)
+    more = one.with_open_nodes()
+    assert more.values.tolist() == [0.0, 0.5, 8.0]
+    assert (more.error_low, more.error_high) == (0.0, 0.2)
+    assert more.with_open_nodes() is more
+
+
+@pytest.mark.parametrize(("low", "least"), [(0.5, 0.3), (0.1, 0.0), (-0.3, -0.3)])
+def test_theta_has_room_for_the_errors_of_both_ends_but_none_below_0(low, least):
+    one = Spectrum(values=np.array([low, 4.0], complex), source="vectors", error_low=0.2, error_high=0.4)
+    assert one.theta == pytest.approx(2 / (2 + least + 4.4))
+
+
+@pytest.mark.parametrize("values", [[1 + 2j, 1 - 2j], [0.1 + 1j, 0.1 - 1j, 3.0], [0.0, 0.5 + 0.4j, 0.5 - 0.4j]])
+def test_theta_of_a_complex_spectrum_has_the_least_factor(values):
+    one = Spectrum.of(values)
+    assert not one.real
+    assert one.factor(one.theta) <= min(map(one.factor, np.linspace(0, 2, 2001))) + 1e-6
+
+
 def test_the_document_has_the_vectors_and_the_ends():
     coupling = Linear([0.5, 2.0, 8.0])
     found = vf.advise_vectors(*coupling.run("aitken", 0.5, 5))

@@ -196,6 +196,13 @@ def test_a_bound_that_is_not_coulombs_is_warned_of_with_its_range_and_coulombs_f
     assert carried["local"] > 2
 
 
+@pytest.mark.parametrize("cells", [(16, 8), (14, 2), (6, 7)])
+def test_an_even_pressure_is_bounded_as_coulomb_has_it_by_the_local_law_on_any_grids(cells):
+    interface = discretise(tipping("local", cells)).interface
+    assert (interface.transfer is None) == (cells == (16, 8))
+    assert interface.kernel @ interface.neumann.weights == pytest.approx(np.ones(interface.contact.n), rel=1e-12)
+
+
 def test_a_run_that_converged_says_the_same_as_the_solution():
     run, solution = vf.run(tipping("local", push="0.01")), vf.solve(tipping("local", push="0.01"))
     assert run.converged
@@ -227,6 +234,19 @@ PAGE = (Path(__file__).parents[2] / "docs" / "problem_file.md").read_text("utf-8
 @pytest.mark.parametrize("name", ["section6", "inside"])
 def test_a_built_in_file_with_friction_says_that_its_law_is_static(name):
     assert "static: right for one monotone loading, not for unloading" in examples()[name]
+
+
+@pytest.mark.parametrize("nodes", [60, 190, 666])
+def test_the_file_of_a_mesh_of_the_paper_says_what_its_radius_is_against_the_mesh_width(nodes):
+    text = examples()[f"section6-{nodes}"]
+    bodies = discretise(vf.example(f"section6-{nodes}"))
+    width = float(np.diff(bodies.interface.neumann.x).max())
+    even = bodies.interface.kernel @ bodies.interface.neumann.weights
+    assert ("half the lower body's mesh width" in text) == (width == pytest.approx(0.2)) == (nodes == 60)
+    assert ("between the mesh width and 0.3 times the length of Gamma_c" in text) == (width < 0.1 + 1e-9)
+    narrow = "sees single nodes and multiplies the friction bound of a node by 0.00 to 2.00"
+    assert any(narrow in warning for warning in bodies.warnings) == (nodes == 60)
+    assert (even.min() == pytest.approx(0) and even.max() == pytest.approx(2)) == (nodes == 60)
 
 
 def test_the_page_gives_the_borders_of_the_warnings():

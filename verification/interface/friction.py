@@ -81,13 +81,16 @@ class Nonlocal(Law):
     def warnings(self, interface: Interface) -> list[str]:
         x, weights, kernel = interface.neumann.x, interface.contact.weights, self.operator(interface)
         r, width, length = self.radius, float(np.diff(x).max()), float(np.ptp(interface.contact.x))
-        # the force that a sliding body carries under an even pressure, as a part of k times the normal force
-        share = float(weights @ kernel @ interface.neumann.weights / weights.sum())
+        # an even pressure as the kernel averages it, and the force that a body then carries while it slides, as a part
+        # of k times the normal force
+        even = kernel @ interface.neumann.weights
+        share = float(weights @ even / weights.sum())
         if r < width * (1 - 1e-9):
-            return [
-                f"contact.radius = {r:g} is below the mesh width {width:g}: the kernel sees single nodes and multiplies"
-                f" friction by about width/radius = {width / r:.3g}"
-            ]
+            effect = f"multiplies friction by about width/radius = {width / r:.3g}"
+            if interface.transfer is not None:
+                effect = f"multiplies the friction bound of a node by {even.min():.2f} to {even.max():.2f}"
+            below = f"contact.radius = {r:g} is below the mesh width {width:g}"
+            return [f"{below}: the kernel sees single nodes and {effect}"]
         if share < 1 - SHARE:
             return [
                 f"contact.radius = {r:g} is not small against the length {length:g} of Gamma_c: the kernel is cut off"

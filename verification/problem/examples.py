@@ -27,11 +27,14 @@ def examples() -> dict[str, str]:
 def _member(section6: str, nodes: int) -> str:
     """Return the file of Section 6 on a mesh of the paper: 10 x 2 and 8 x 2 cells, halved; the two grids differ."""
     n = 2 ** FAMILY[nodes]
+    usual = "between the mesh width and 0.3 times the length of Gamma_c"
+    half = f"half the lower body's mesh width: a node has\n{'# 0 to 2 times the friction of an even pressure':>77}"
     return (
         section6.replace(
             "# The two-body model of Section 6,", f"# The two-body model of Section 6 on its mesh of {nodes} nodes,"
         )
         .replace('title = "Section 6, centred"', f'title = "Section 6, {nodes} nodes"')
+        .replace(usual, half if n == 1 else usual)
         .replace("cells = [40, 6]", f"cells = [{10 * n}, {2 * n}]")
         .replace("cells = [24, 6]", f"cells = [{8 * n}, {2 * n}]")
     )
