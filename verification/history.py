@@ -23,7 +23,7 @@ from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.rates import largest_step_ratio
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.runs import Run, check_memory, run_from
-from verification.algorithm.start import Start, begin_at
+from verification.algorithm.start import LEAST, Start, begin_at, tied_size
 from verification.algorithm.theta import choose
 from verification.bounds.bound import BoundResult, Subject
 from verification.bounds.table import BOUNDS, named
@@ -45,10 +45,6 @@ if TYPE_CHECKING:
     from verification.document import Figure
 
 Method = Literal["iteration", "monolithic"]
-
-#: An increment that takes all load away ends at this share of the tolerance, of the largest force of the history: the
-#: forces that are left are rounding, and decay for ever beside themselves.
-LEAST = 1e-6
 
 #: Why an increment of the global method has no number of the iteration.
 NO_ITERATION = "the global method solves the increment at once"
@@ -482,6 +478,9 @@ class _Iteration:
         systems = Systems(contact.schur, contact.free, motions)
         before: Run | None = None
         largest = 0.0
+        ends = [moment.problem for moment in path if moment.time.denominator == 1]
+        # loads change in proportion between these ends, where a norm of what follows from them is largest
+        tied = max(tied_size(self._pair.under(problem, None)) for problem in ends)
         for moment in path:
             earlier = None if before is None else before.contact
             pair = self._pair.under(moment.problem, _slipped(earlier, self._pair.interface))
@@ -489,12 +488,12 @@ class _Iteration:
             if before is None or not largest:
                 start = begin_at(T)
             else:
-                why = "the forces of the increment before"
-                start = Start(g=before.last.g, source="given", why=why, scale=LEAST * largest)
+                start = Start(g=before.last.g, source="given", why="the forces of the increment before")
+            start = replace(start, scale=LEAST * max(largest, tied))
             run = run_from(T, self._rule, self._choice, start)
             if run.outcome == "interrupted":
                 raise KeyboardInterrupt
-            largest = max(largest, run.last.scale)
+            largest = max(largest, run.last.size)
             seen = largest_step_ratio(pair, run.iterates)
             verdicts = {name: judge_bound(bound, seen, self._outside) for name, bound in self.bounds.items()}
             promise, why = self._promise(before, run)

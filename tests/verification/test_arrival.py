@@ -34,6 +34,36 @@ def test_no_run_that_converged_is_far_from_the_global_method_however_stiff_the_c
                 assert run.coupled_residual <= max(MOST, TOLERANCES * tolerance)
 
 
+def closing(push: str, **more: str) -> vf.Problem:
+    """Section 6 with a gap of 0.01, which the top of the upper body closes by so much more."""
+    problem = vf.example("section6").changed(cells=((30, 2), (18, 2)), radius="0.2")
+    top = {"body2.prescribed": f'{{ top = [0, "-{push}"] }}', "contact.gap": "0.01"}
+    return problem.with_keys(top | {f"iteration.{key}": value for key, value in more.items()})
+
+
+@pytest.mark.parametrize("more", [{}, {"relaxation": "aitken"}, {"neumann_body": "2", "theta": "0.1"}], ids=str)
+@pytest.mark.parametrize("push", ["0.01", "0.010000000001", "0.0100000001", "0.01000001", "0.011"])
+def test_a_run_arrives_where_contact_just_closes(push, more):
+    """The forces are rounding of those of the bodies tied together, or hardly more; they are those of the solution."""
+    pair = vf.build(closing(push, **more))
+    run, wanted = vf.run(pair), vf.solve(pair).contact.force["normal"]
+    assert run.converged
+    whole = np.abs(tied_force(pair, drawn=True)[pair.neumann.grid.normal]).sum()
+    assert run.contact.force["normal"] == pytest.approx(wanted, rel=1e-8, abs=1e-13 * whole)
+    (row,) = vf.sweep(pair.problem, theta=[float(run.theta)]).rows if not more else [None]
+    assert row is None or abs(row["iterations"] - run.iterations) <= 1  # its own rounding
+
+
+@pytest.mark.parametrize("tolerance", ["1e-2", "1e-4", "1e-6"])
+@pytest.mark.parametrize("push", ["0.010000000001", "0.010001"])
+def test_a_coarse_tolerance_calls_no_small_force_none(push, tolerance):
+    """Forces of 1e-10 of those of the bodies tied together are found to within the tolerance all the same."""
+    run = vf.run(closing(push, tolerance=tolerance))
+    wanted = vf.solve(run.pair).contact.force["normal"]
+    assert run.converged
+    assert run.contact.force["normal"] == pytest.approx(wanted, rel=3 * float(tolerance) + 1e-4)
+
+
 def test_bodies_that_the_first_step_throws_apart_have_not_arrived():
     """Section 6 with a contact body 3000 times as stiff: every node is open while g decays."""
     problem = vf.example("section6").with_keys({"body2.young": "2.1e8", "iteration.tolerance": "1e-4"})

@@ -29,6 +29,9 @@ LARGEST = 1_500_000
 #: Rounding of displacements to a byte and of lifts to two.
 ROUNDED = 1 / 100
 
+#: Rounding to the nearest 127th, and of its size to four digits.
+NEAREST = 0.51 / 127
+
 
 @pytest.fixture(scope="module")
 def found():
@@ -103,7 +106,7 @@ def test_the_pictures_of_a_step_are_those_of_the_run(found, data):
         length, stress = data["roles"][role]["scales"][frame]
         fields = made.contact_at(iterate)
         assert row[sum(sizes) : -n] * stress / 127 == pytest.approx(
-            np.concatenate([fields.pressure, fields.shear]), abs=ROUNDED * stress
+            np.concatenate([fields.pressure, fields.shear]), abs=NEAREST * stress
         )
         assert [STATES[int(i)] for i in row[-n:]] == list(fields.status)
         begin = 0
@@ -112,6 +115,7 @@ def test_the_pictures_of_a_step_are_those_of_the_run(found, data):
         ):
             lift = numbers(body["lift"], "<i2").reshape(-1, len(trace)) * body["size"] / 32767
             drawn = np.array(body["still"]) + lift @ (row[begin : begin + len(trace)] * length / 127)
+            assert row[begin : begin + len(trace)] * length / 127 == pytest.approx(trace, abs=NEAREST * length)
             exact = side.mesh_body.displacement(trace).ravel()
             assert drawn == pytest.approx(exact, abs=3 * ROUNDED * max(length, np.abs(exact).max()))
             begin += len(trace)

@@ -17,6 +17,7 @@ import verification as vf
 from fem1d2d import condense
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.rates import noise
+from verification.algorithm.start import LEAST, tied_size
 from verification.history import History
 from verification.interface.files import write_interface
 from verification.problem.steps import at_rest, moments
@@ -404,3 +405,33 @@ def test_bodies_that_part_are_warned_of_only_where_they_never_meet():
         for path, more, said in ((lifts, {}, 0), (lifts, apart, 0), (far, apart, 1)):
             found = vf.march(problem(path, **more), method=method)
             assert sum("nothing touches" in line for line in found.warnings) == said
+
+
+@pytest.mark.parametrize("end", ["-0.02", "-0.010000000001"])
+def test_a_history_goes_on_where_contact_just_closes_or_just_opens(end):
+    """After the first increment, and before the last one, the gap is 0 up to rounding."""
+    finer = {"body1": {"cells": [30, 2]}, "body2": {"cells": [18, 2]}, "contact": {"gap": "0.01"}}
+    path = {"press": (2, [0, end]), "lift": (2, [0, 0])}
+    one, two = (vf.march(problem(path, **finer), method=method) for method in ("iteration", "monolithic"))
+    assert one.converged
+    assert len(one.increments) == 4
+    force = np.array([[each.contact.force["normal"] for each in history.increments] for history in (one, two)])
+    assert force[0] == pytest.approx(force[1], abs=1e-9 * force.max() + 1e-10)
+    assert one.increments[0].run.iterations < 3
+
+
+def test_forces_small_beside_the_largest_of_a_history_are_none_and_others_are_not():
+    """A residual ends at the tolerance times LEAST of the largest force, tied or of an increment before."""
+    path = {"press": (1, [0, "-0.01"]), "ease": (1, [0, "-0.001"]), "lift": (1, [0, "0.01"])}
+    found = vf.march(problem(path))
+    press, ease, lift = (each.run for each in found.increments)
+    largest = max(tied_size(each.pair) for each in (press, lift))
+    assert largest > press.last.size > 2 * ease.last.size
+    for run in (press, ease, lift):
+        assert run.start.scale == pytest.approx(LEAST * largest, rel=1e-9)
+    assert lift.last.scale == lift.start.scale
+    assert lift.last.residual <= 1e-9 * lift.start.scale < lift.iterates[-2].residual
+    slight = {"press": (1, [0, "-0.02"]), "ease": (1, [0, "-0.0100001"])}
+    last = vf.march(problem(slight, contact={"gap": "0.01"})).increments[-1].run.last
+    assert last.scale < 1e-4 * largest
+    assert last.scale == pytest.approx(last.size, rel=1e-8)

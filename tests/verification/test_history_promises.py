@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from histories import PATH, VARIANTS, pressed_and_sheared
+from made_up import Halfway
 
 import verification as vf
 from fem1d2d import stiffness
 from verification.algorithm.rates import noise
+from verification.bounds.table import BOUNDS
 from verification.history import steps_to
 from verification.problem.steps import at_rest
 
@@ -86,6 +88,27 @@ def test_every_increment_has_the_factor_of_the_first_and_keeps_its_promise():
         assert each.iterations <= promise.steps
         assert each.verdicts["energy"].verdict in ("CONSISTENT", "NOT_COMPUTED")
     assert not found.proved_violated
+
+
+def test_a_promise_is_made_of_the_load_the_residual_before_the_least_scale_and_the_least_factor(monkeypatch):
+    """Two bounds prove a factor; a coarse tolerance leaves a residual that counts."""
+    monkeypatch.setitem(BOUNDS, "halfway", Halfway())
+    path = {"press": (3, [0, "-0.01"]), "ease": (2, [0, "-0.002"])}
+    found = vf.march(problem(path, contact={"friction": "0.15"}, iteration={"tolerance": "1/100"}))
+    factors = [found.bounds[name].factor.value for name in ("energy", "halfway")]
+    assert max(factors) > 1.1 * min(factors)
+    left, rho = 0.0, found.measured.rho_max.value
+    differ = 0
+    for each in found.increments:
+        promise, run = each.promise, each.run
+        scales = [iterate.scale for iterate in run.iterates]
+        assert promise.factor == min(factors)
+        assert promise.residual == pytest.approx(np.sqrt(rho) * promise.load + left, rel=1e-12)
+        assert promise.steps == steps_to(promise.residual, 1e-2 * min(scales), min(factors))
+        differ += promise.steps != steps_to(promise.residual, 1e-2 * max(scales), min(factors))
+        left = run.last.residual
+        assert left > 1e-4 * promise.residual
+    assert differ > 0
 
 
 @pytest.mark.parametrize(

@@ -219,3 +219,12 @@ def test_the_bound_of_a_constant_theta_is_attained_at_the_largest_eigenvalue(hig
     theta = 2 / (2 + high)
     assert at_most(high, theta) == steps(Spectrum.of([high]), "constant", theta)
     assert at_most(high, 2.01 / (1 + high)) is None
+
+
+@pytest.mark.parametrize("high", [0.5, 3.0, 40.0])
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_steps_of_a_constant_theta_are_counted_with_the_image_of_the_error_on_its_own_side(high, n):
+    """``|T x| = 1 + high q^n`` for an error ``-q^n``: where ``(1 + high) q^n`` is the tolerance, a step less does."""
+    q = (1e-6 / (1 + high)) ** (1 / n)
+    theta = (1 - q) / (1 + high)
+    assert steps(Spectrum.of([high]), "constant", theta) == by_hand([high], theta) == n + 1

@@ -12,6 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import verification as vf
+from verification.advice.pace import pooled
 from verification.advice.readings import Made, NextRun, anew, kept, pasted_or_not
 
 
@@ -227,3 +228,15 @@ def test_theta_1_is_named_as_the_first_run_only_where_no_run_like_it_was_made_an
     high, rises = any(float(theta) >= 0.9 for theta, _ in made), any(log.diverges for log in found.logs)
     decided = bool(found.roles) or found.next.kept
     assert named == (not (high or rises or decided or options.get("friction", False)))
+
+
+@pytest.mark.parametrize("steps", [2, 3, 8, 9])
+def test_a_pooled_ratio_is_the_mean_over_the_second_half_of_each_window(steps):
+    """The first half falls twice as fast."""
+    half, ratios = steps // 2, np.array([0.5, 0.6, 0.7, 0.8, 0.9])
+    windows = [np.cumprod([1.0, *[ratio / 2] * (steps - half), *[ratio] * half]) for ratio in ratios]
+    found = pooled(windows, relative=False, steps=5 * half)
+    assert float(found.value) == pytest.approx(0.7, rel=1e-12)
+    ends = np.exp(np.quantile(np.log(ratios), [0.1, 0.9]))
+    assert [float(found.least), float(found.most)] == pytest.approx(ends, rel=1e-12)
+    assert pooled(windows, relative=False, steps=5 * half + 1) is None

@@ -55,10 +55,14 @@ def coupled_residual(pair: ContactPair, iterate: Iterate) -> float | None:
     On grids that differ the traction of g on the contact grid is the reaction of step II and the difference g - T g,
     carried there as a stress; at a fixed point it is the reaction itself.
     """
+    violation, size = _violation(pair, iterate)
+    return None if size <= pair.settings.tolerance * iterate.scale else violation / size
+
+
+def _violation(pair: ContactPair, iterate: Iterate) -> tuple[float, float]:
+    """Return the largest violation of a contact condition by the joined state at g, and the size of g."""
     neumann, grid = pair.neumann, pair.contact.grid
     size = math.sqrt(max(float(iterate.g @ (iterate.displacement - neumann.unloaded)), 0.0))
-    if size <= pair.settings.tolerance * iterate.scale:
-        return None
     off = iterate.g - iterate.image
     force = iterate.contact.force + pair.interface.spread(off)
     pressure, touching = force[grid.normal], iterate.contact.pattern.touching
@@ -71,13 +75,17 @@ def coupled_residual(pair: ContactPair, iterate: Iterate) -> float | None:
         parts[grid.tangential, 2] = shear - np.clip(shear, -bound, bound)
     violations = np.column_stack([pair.interface.carry_back(parts), off])
     lengths = np.einsum("ij,ij->j", violations, neumann.flexibility(violations))
-    return math.sqrt(max(float(lengths.max()), 0.0)) / size
+    return math.sqrt(max(float(lengths.max()), 0.0)), size
 
 
 def arrived(pair: ContactPair, iterate: Iterate) -> bool:
-    """Return True if the joined state at g meets the conditions of contact as closely as a run must end."""
-    found = coupled_residual(pair, iterate)
-    return found is None or found <= max(MOST, TOLERANCES * pair.settings.tolerance)
+    """Return True if the joined state at g meets the conditions of contact as closely as a run must end.
+
+    Forces within the tolerance of 0 beside the scale of the iterate are none.
+    """
+    tolerance = pair.settings.tolerance
+    violation, size = _violation(pair, iterate)
+    return min(violation, size) <= tolerance * iterate.scale or violation <= max(MOST, TOLERANCES * tolerance) * size
 
 
 class Ending:

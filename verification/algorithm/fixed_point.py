@@ -83,10 +83,10 @@ class FixedPointMap:
         return replace(solution, v=v, force=force, pattern=replace(solution.pattern, sliding=sliding))
 
 
-def iterate_at(T: FixedPointMap, g: Floats) -> Iterate:
-    """Evaluate T at g."""
+def iterate_at(T: FixedPointMap, g: Floats, least: float = 0.0) -> Iterate:
+    """Evaluate T at g; its scale is ``least`` or more."""
     with one_thread():
-        return _evaluate(T, g, T.displacement(g))[0]
+        return _evaluate(T, g, T.displacement(g), None, least)[0]
 
 
 def _evaluate(

@@ -22,7 +22,7 @@ from verification.algorithm.linearisation import Forecast, Linearisation, NotLin
 from verification.algorithm.rates import ObservedRate, observed_rate
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.remedy import Remedy, remedy_of
-from verification.algorithm.start import Start, begin_at
+from verification.algorithm.start import Start, begin_at, compared_with
 from verification.algorithm.theta import Choice, choose
 from verification.constants import Measured
 from verification.contact import ContactError, Solver
@@ -457,7 +457,7 @@ def run_from(
     outcome: Outcome | None = None
     joined = lambda: arrived(pair, seen[-1])
     try:
-        for found in iterates(T, step, start.g, start.scale):
+        for found in iterates(T, step, start.g, compared_with(pair, start)):
             seen.append(found)
             watch(found)
             outcome = ending.at(found.iteration, found.residual, found.scale, joined)

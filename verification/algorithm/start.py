@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import solve
 
 from fem1d2d.mesh import Floats
 from ndtheory.number import Numeric
@@ -23,6 +22,13 @@ from verification.interface.pair import ContactPair
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.value import Value
+
+#: Forces below this share of the largest ones of a loading history are none: those that are left where load is taken
+#: away, or where contact just closes, are rounding of larger ones, and decay for ever beside themselves.
+LEAST = 1e-6
+
+#: A residual below this share of the forces of the bodies tied together is rounding of these.
+ROUNDING = 1e-15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -140,20 +146,37 @@ def forces(given: ArrayLike, pair: ContactPair, source: str = "") -> Floats:
         raise ProblemError(source or pair.source, "start", None, str(error)) from None
 
 
-def tied_force(pair: ContactPair) -> Floats:
-    """Solve for g of the bodies tied along Gamma_c, gap closed: ``(S2 + P' S1 P) u2 = l2 + P' (l1 - S1 offset)``.
+def tied_force(pair: ContactPair, *, drawn: bool = False) -> Floats:
+    """Solve for g of the bodies tied along Gamma_c: ``(S2 + P' S1 P) u2 = l2 + P' (l1 - S1 offset)``.
 
-    Linear, without contact and friction, so that it exists wherever the supports hold the two bodies as one.
+    The gap is closed, and slip so far is an offset, unless the bodies are tied as they are ``drawn``.  Linear, without
+    contact and friction, so that it exists wherever the supports hold the two bodies as one.
     """
     contact, neumann, interface = pair.contact, pair.neumann, pair.interface
-    apart = interface.carry(neumann.known) + pair.offset
+    apart = interface.carry(neumann.known) + (0.0 if drawn else pair.offset)
     matrix = neumann.schur + interface.carry_form(contact.schur)
     right = neumann.load + interface.carry_back(contact.load - contact.schur @ apart)
     free = neumann.free
     u = np.zeros(len(right))
-    u[free] = solve(matrix[np.ix_(free, free)], right[free], assume_a="pos")
+    u[free] = np.linalg.solve(matrix[np.ix_(free, free)], right[free])
     force: Floats = np.where(free, neumann.schur @ u - neumann.load, 0.0)
     return force
+
+
+def tied_size(pair: ContactPair) -> float:
+    """Return the size of the forces of the bodies tied as they are drawn, in the norm (5.21).
+
+    It is the stiffness of both bodies times what the loads would move them apart, whatever gap they close before.
+    """
+    return pair.neumann.dual_norm(tied_force(pair, drawn=True))
+
+
+def compared_with(pair: ContactPair, start: Start) -> float:
+    """Return the least size of the forces with which the residuals of a run are compared, in the norm (5.21).
+
+    Beside the scale of its start it is a share of :func:`tied_size` at which the tolerance is rounding.
+    """
+    return max(start.scale, min(LEAST, ROUNDING / pair.settings.tolerance) * tied_size(pair))
 
 
 def least_scale(T: FixedPointMap, g: Floats) -> float:

@@ -25,7 +25,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, at_solution, linearised_rate
 from verification.algorithm.rates import Noise, rate_of
 from verification.algorithm.relaxation import Constant, Relaxation, Rule, Step
-from verification.algorithm.start import Start, begin_at
+from verification.algorithm.start import Start, begin_at, compared_with
 from verification.algorithm.theta import Choice
 from verification.contact import ContactError
 from verification.contact.active_set import SLACK, Pattern, Systems
@@ -258,6 +258,11 @@ class KnownPieces:
         """Start of the runs."""
         return begin_at(self.map())
 
+    @cached_property
+    def least(self) -> float:
+        """Least size of the forces with which residuals are compared."""
+        return compared_with(self.pair, self.start)
+
     def steps(self, T: FixedPointMap, theta: float) -> Iterator[Steps]:
         """Yield the run of a new :meth:`map` with constant relaxation from its start, without end."""
         found = iterate_at(T, self.start.g)
@@ -327,12 +332,12 @@ def course(
     ContactError
         Step II did not reach its certificate before the run ended.
     """
-    T, went = pieces.map(), None
+    T, went, least = pieces.map(), None, pieces.least
     if isinstance(step, Relaxation) and not pair.held:
         went = _follow(pieces, pieces.steps(T, step.theta), T, lean=True)
     if went is None:  # any rule, and where rounding decides: a residual that wanders, or meets the tolerance exactly
         T.restart()
-        went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g)), T, lean=False)
+        went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g, least)), T, lean=False)
     assert went is not None  # only lean steps leave it to others
     steps = len(went.residuals) - 1
     reason = {
@@ -411,7 +416,7 @@ def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, 
 
     Lean steps, which are not evaluated one by one, give None where rounding decides when the run ends.
     """
-    pair, bound = pieces.pair, pieces.pair.settings.tolerance
+    pair, bound, least = pieces.pair, pieces.pair.settings.tolerance, pieces.least
     ending = Ending(pair.settings)
     residuals: list[float] = []
     walked: list[tuple[Floats, Floats]] = []
@@ -430,9 +435,10 @@ def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, 
                 walked.append((taken.g, taken.u))
                 if taken.piece != piece:
                     piece, first = taken.piece, taken.g[:, 0]
-            for i, (residual, scale) in enumerate(zip(taken.residual.tolist(), taken.scale.tolist(), strict=True)):
+            scales = np.maximum(taken.scale, least).tolist()
+            for i, (residual, scale) in enumerate(zip(taken.residual.tolist(), scales, strict=True)):
                 n += 1
-                here = partial(_evaluated, T, taken, i)
+                here = partial(_evaluated, T, taken, i, least)
                 ended = ending.at(n, residual, scale, partial(joined, here))
                 if outcome is None:
                     residuals.append(residual)
@@ -466,9 +472,9 @@ def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, 
     )
 
 
-def _evaluated(T: FixedPointMap, taken: Steps, i: int) -> Iterate:
+def _evaluated(T: FixedPointMap, taken: Steps, i: int, least: float) -> Iterate:
     """Return T at one of some steps."""
-    return taken.found or iterate_at(T, taken.g[:, i])
+    return taken.found or iterate_at(T, taken.g[:, i], least)
 
 
 def _paper(g: Floats, before: Floats, last: int) -> int | None:
