@@ -28,7 +28,8 @@ def sections(found: History) -> Sections:
     """The sections."""
     first = found.increments[0].result
     nodes = sum(len(body.mesh.points) for body in first.bodies.elastic)
-    then = following("march", "-o", "results") if found.converged else following("run", iteration=True)
+    page = ("explore", "-o", "page.html")
+    then = following("march", "-o", "results", written=page) if found.converged else following("run", iteration=True)
     return (
         setting(found.problem, nodes, len(found.increments[0].contact.x)),
         section("history", "WHAT HAPPENED", *_happened(found), caption=STEPS, pictures=PICTURES),
