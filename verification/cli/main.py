@@ -46,7 +46,7 @@ from verification.interrupts import second_ends
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, BAD_INPUT, INTERRUPTED, CRASH = 0, 2, 130, 70
 
-#: Done, but whoever read stdout left before the answer came: as the shell reports programs that SIGPIPE ends.
+#: Done, but the reader of stdout left before the answer came: as the shell reports programs that SIGPIPE ends.
 UNREAD = 141
 
 
