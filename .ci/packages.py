@@ -3,7 +3,8 @@
 Builds the sdist and the wheel, and both once more from the sdist: the bytes must be the same.  Then, for every Python
 of the classifiers and the one after them that lies on this machine, puts the wheel and click into an empty environment
 and runs, in an empty folder, what needs nothing else: the doctests of the package `ndtheory` and the calculator.  With
-the dependencies of the calling environment the wheel also iterates.
+the dependencies of the calling environment the wheel also runs README's list of commands, as printed; --whole: its
+slow one, too.
 
 SOURCE_DATE_EPOCH is the date of all files in both archives, in seconds since 1970; by default that of the last commit.
 """
@@ -42,6 +43,22 @@ sys.exit(sum(result.failed for result in results))
 """
 
 
+#: A command of README's list that takes as long as all others, and what is run for it.
+SLOW = {"ndtheory reproduce all": "ndtheory reproduce fig5"}
+
+#: What a command has of the environment, on all systems.
+INHERITED = ("PATH", "HOME", "LANG", "SYSTEMROOT", "USERPROFILE", "TEMP")
+
+
+def listed(readme: str) -> list[str]:
+    """README's list of commands, without the comments.
+
+    >>> listed("## Commands\\n\\n    ndtheory example x > my.toml   # a file\\n    ndtheory run my.toml\\n\\nText")
+    ['ndtheory example x > my.toml', 'ndtheory run my.toml']
+    """
+    return re.findall(r"(?m)^    (ndtheory .*?)(?: +#.*)?$", readme.partition("## Commands")[2])
+
+
 #: The folder of commands in an environment.
 COMMANDS = "Scripts" if os.name == "nt" else "bin"
 
@@ -54,6 +71,17 @@ def run(*command: str | Path, cwd: Path = ROOT, **more: str) -> str:
     if found.returncode:
         sys.exit(f"{' '.join(map(str, command))}: exit status {found.returncode}\n{found.stdout}{found.stderr}")
     return found.stdout
+
+
+def typed(command: str, path: Path, cwd: Path) -> None:
+    """Run what a user types in a folder, with the commands of an environment; one that fails ends this program."""
+    alone = {name: os.environ[name] for name in INHERITED if name in os.environ}
+    alone["PATH"] = f"{path}{os.pathsep}{alone['PATH']}"
+    found = subprocess.run(
+        command, shell=True, cwd=cwd, env=alone, capture_output=True, text=True, encoding="utf-8", check=False
+    )
+    if found.returncode:
+        sys.exit(f"{command}: exit status {found.returncode}\n{found.stdout}{found.stderr}")
 
 
 def environment(folder: Path, interpreter: str, *packages: str | Path) -> Path:
@@ -114,7 +142,9 @@ def interpreter(version: str) -> str | None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="where the sdist and the wheel stay")
-    keep = parser.parse_args().keep
+    parser.add_argument("--whole", action="store_true", help="run the slow command of README's list, too")
+    given = parser.parse_args()
+    keep = given.keep
     versions = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["project"]["classifiers"]))
     versions.append(f"3.{int(versions[-1].partition('.')[2]) + 1}")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
@@ -140,9 +170,10 @@ def main() -> None:
             if python == sys.executable:
                 site = run(commands / "python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip()
                 Path(site, "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n", "utf-8")
-                (empty / "my.toml").write_text(run(commands / "ndtheory", "example", "section6", cwd=empty), "utf-8")
-                run(commands / "ndtheory", "run", "my.toml", "-o", "results", cwd=empty)
-                print(f"Python {version}: ndtheory run")
+                lines = listed((ROOT / "README.md").read_text("utf-8"))
+                for line in lines:
+                    typed(line if given.whole else SLOW.get(line, line), commands, empty)
+                print(f"Python {version}: the {len(lines)} commands of README's list")
         if len(answers) != 1:
             sys.exit(f"the calculator gives {len(answers)} different documents under {', '.join(versions)}")
 

@@ -92,7 +92,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "squares style sweep waterfall"
         )
     },
-    "files": {"verification.output": "__init__ fields files folder report"},
+    "files": {"verification.output": "__init__ fields files folder inputs report"},
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (

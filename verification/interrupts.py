@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
+from types import FrameType
 
 #: The reason for a part that is missing after Ctrl-C.
 INTERRUPTED = "interrupted before it was worked out"
@@ -36,6 +37,59 @@ def undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def cleaned_up() -> Iterator[None]:
+    """Return a context that SIGTERM or SIGHUP ends by an exception, as for its cleaning up, and then the process.
+
+    Elsewhere than in the main thread, or where a program has its own handler, they keep what they do.
+    """
+    names = ("SIGTERM", "SIGHUP")  # Windows lacks the second one
+    ends = [number for name in names if (number := getattr(signal, name, None)) is not None]
+    ours = threading.current_thread() is threading.main_thread()
+    ends = [number for number in ends if ours and signal.getsignal(number) is signal.SIG_DFL]
+    ended_by: list[int] = []
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        ended_by.append(number)
+        raise _Ended
+
+    for number in ends:
+        signal.signal(number, leave)
+    try:
+        yield
+    finally:
+        for number in ends:
+            signal.signal(number, signal.SIG_DFL)
+        for number in ended_by:
+            signal.raise_signal(number)
+
+
+class _Ended(BaseException):
+    """SIGTERM or SIGHUP."""
+
+
+@contextlib.contextmanager
+def in_time(seconds: float) -> Iterator[None]:
+    """Return a context that a TimeoutError ends after so many seconds of processor time.
+
+    Only in the main thread, and not on Windows.  Code of C must look for signals, as the module ``re`` does.
+    """
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def late(number: int, frame: FrameType | None) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGVTALRM, late)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
 
 
 @contextlib.contextmanager

@@ -33,6 +33,18 @@ CALLS = {
 }
 
 
+def test_a_pattern_with_repeats_inside_repeats_is_refused_after_some_time(call, tmp_path, monkeypatch):
+    monkeypatch.setattr("verification.advice.log_files.SECONDS", 1)
+    log = tmp_path / "solver.out"
+    log.write_text("a" * 80 + "\n", "utf-8")
+    complaint = call("advise", "run", "--log", log, "--theta", "0.5", "--pattern", "(?:a+)+b (.*)").complaint
+    assert complaint.startswith(
+        f"ndtheory: {log}: searching it takes more than 1 s of processor time: needed no repeats"
+    )
+    log.write_text("b 0.1\nb 0.01\nb 0.001\nb 1e-4\n", "utf-8")
+    assert call("advise", "run", "--log", log, "--theta", "0.5", "--pattern", "(?:a*)b (.*)").status == 0
+
+
 @pytest.mark.parametrize("name", CALLS)
 def test_the_screen_of_logs_fits_80_columns_and_46_lines_and_says_what_it_assumes(call, log, name):
     words = [word for theta in CALLS[name] for word in log(theta)]

@@ -4,6 +4,8 @@ import shlex
 
 import pytest
 
+import verification as vf
+
 SMALL = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}
 SETS = ("--set", "contact.friction=0.3", "--set", "body1.y=[-0.4, 0]", "--set", 'title="a b"')
 
@@ -34,6 +36,39 @@ def test_a_comparison_is_suggested_with_the_theta_the_rule_and_the_roles_of_the_
     words = suggested(call("run", file, *options))
     assert words == ["compare", str(file), *options]
     assert call(*words, "--json").document["problem"] == run
+
+
+def test_a_history_whose_files_are_written_leads_to_its_page(call, quick, write, tmp_path):
+    file = write(text=vf.example("history").to_toml())
+    assert suggested(call("march", file)) == ["march", str(file), "-o", "results"]
+    written = call("march", file, "-o", tmp_path / "om")
+    assert suggested(written) == ["explore", str(file), "-o", "page.html"]
+
+
+OBSTACLE = """
+[body1]
+shape = "rectangle"
+x = [0, 2]
+y = [-1, 0]
+cells = [4, 2]
+young = 1
+poisson = 0.3
+prescribed = { bottom = [0, 0.01] }
+[body2]
+shape = "rigid"
+x = [0, 2]
+y = [0, 1]
+[contact]
+friction = 0.1
+law = "local"
+"""
+
+
+def test_a_solution_on_an_obstacle_whose_files_are_written_asks_for_no_other_folder(call, quick, tmp_path):
+    file = tmp_path / "obstacle.toml"
+    file.write_text(OBSTACLE, "utf-8")
+    assert suggested(call("solve", file)) == ["solve", str(file), "-o", "results"]
+    assert "Next:" not in call("solve", file, "-o", tmp_path / "om").out
 
 
 @pytest.mark.parametrize("command", ["constants", "compare"])

@@ -165,7 +165,8 @@ def test_a_shell_is_given_its_script(call, monkeypatch, shell, needed):
 
 def test_names_that_the_program_knows_are_completed(complete):
     family = [f"section6-{nodes}" for nodes in (60, 190, 666, 2482)]
-    assert complete("example", "") == ["chain", "inside", "jaws", "section6", *family, "signorini", "stack", "two-bars"]
+    others = ["signorini", "stack", "two-bars"]
+    assert complete("example", "") == ["chain", "history", "inside", "jaws", "section6", *family, *others]
     assert complete("example", "s") == ["section6", *family, "signorini", "stack"]
     assert complete("run", "my.toml", "--relaxation", "") == list(RULES)
     assert complete("compare", "--relaxation", "an") == ["anderson"]

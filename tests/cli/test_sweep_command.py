@@ -2,6 +2,7 @@
 
 import csv
 import importlib.util
+import os
 import re
 import signal
 from fractions import Fraction
@@ -299,6 +300,29 @@ def test_plots_are_drawn_beside_the_table(call, sweep_file, tmp_path):
     ]
     assert b"relaxation factor theta" in (tmp_path / "grid-theta-iterations.svg").read_bytes()
     assert "grid-theta-law.svg is not drawn: no row has a number for law" in answer.err
+
+
+def test_names_that_are_no_utf_8_are_written_and_exported(call, sweep_file, tmp_path):
+    pytest.importorskip("netCDF4")
+    name, folder = (os.fsdecode(text) for text in (b"gr\xff", b"ex\xfe"))
+    try:
+        path = sweep_file().rename(tmp_path / f"{name}.toml")
+    except OSError:
+        pytest.skip("a file system that needs names in UTF-8")
+    options = (
+        "--jobs",
+        1,
+        "--export",
+        tmp_path / folder,
+        "--plot",
+        "theta,iterations",
+        "--log",
+        tmp_path / f"{name}.log",
+    )
+    assert call("sweep", path, *options).status == 0
+    assert sorted(each.name for each in (tmp_path / folder).iterdir()) == [f"{name}.csv", f"{name}.nc"]
+    assert (tmp_path / folder / f"{name}.nc").read_bytes()[1:4] == b"HDF"
+    assert (tmp_path / f"{name}-theta-iterations.svg").is_file()
 
 
 def test_a_log_has_lines_about_rows_done_failed_and_left(call, sweep_file, tmp_path):

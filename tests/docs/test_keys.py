@@ -312,6 +312,7 @@ def test_every_document_fits_its_schema_which_has_its_keys_and_no_other(document
         "bounds --rho 2",
         "example",
         "example section6",
+        f"example --inputs {folder / 'inputs'}",
         f"sweep {folder / 'grid.toml'} --dry-run",
         f"certify {folder / 'small.toml'} --set contact.friction=5",  # no proof
         f"region {folder / 'small.toml'} -o {folder / 'plane.svg'}",

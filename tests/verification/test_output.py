@@ -207,6 +207,25 @@ def test_a_process_that_is_killed_leaves_files_of_one_run_and_the_next_one_clean
     assert contents(tmp_path) == {"b.json": b"newest"}
 
 
+#: Writes a file into a folder, and gets a signal before it is there.
+ENDED = """
+import os, sys, time
+from pathlib import Path
+from verification.output.files import staged
+
+with staged(Path(sys.argv[1])) as room:
+    (room / "a.json").write_text("new")
+    os.kill(os.getpid(), int(sys.argv[2]))
+    time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_process_that_is_ended_while_it_writes_leaves_nothing_and_ends_by_the_signal(tmp_path, number):
+    assert ended(ENDED, tmp_path, int(number)).returncode == -number
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_files_that_another_process_is_writing_are_left_to_it(tmp_path):
     with staged(tmp_path) as room:
         (room / "a.json").write_text("mine")

@@ -103,7 +103,8 @@ def test_a_dictionary_has_the_keys_of_the_file_and_the_defaults(problem):
     document = problem.to_dict()
     plane = ["plane"] if problem.dimension == 2 else []
     bodies, several = [f"body{i}" for i in problem.bodies], isinstance(document["contact"], list)
-    assert list(document) == ["title", "dimension", *plane, "units", *bodies, "contact", "iteration", "norm"]
+    steps = ["step"] if problem.steps else []
+    assert list(document) == ["title", "dimension", *plane, "units", *bodies, "contact", "iteration", "norm", *steps]
     roles = "neumann_bodies" if several else "neumann_body"
     assert list(document["iteration"]) == [roles, "theta", "relaxation", "tolerance", "max_iterations"]
     for contact in document["contact"] if several else [document["contact"]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
@@ -18,10 +18,15 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.advice.log_lines import Form, Residual, form_of, form_of_pattern
+from verification.interrupts import in_time
 from verification.problem.tables import ProblemError, short, unreadable
 
 #: Largest log that is read; a million lines of preCICE with four fields have 80 MB.
 MOST_BYTES = 500_000_000
+
+#: Seconds of processor time for a pattern that a user gave: repeats inside repeats may take for ever.  Others take some
+#: 2 s for ten million characters.
+SECONDS, SECONDS_PER_CHARACTER = 10, 1e-6
 
 #: So many lines at both ends of a log show how many digits its numbers have.
 LOOKED_AT = 200
@@ -102,8 +107,14 @@ def read_log(path: Path, pattern: str | None = None) -> Log:
     text = _ANSI.sub("", _text(path))
     if not text.strip():
         raise _refused(path, "needed residuals, this file is empty")
+    seconds = int(SECONDS + SECONDS_PER_CHARACTER * len(text))
     form = form or form_of(text)
-    log = _LogTable(path, text).log() if form is None else _read_lines(path, text, form)
+    try:
+        with in_time(seconds) if pattern is not None else nullcontext():
+            log = _LogTable(path, text).log() if form is None else _read_lines(path, text, form)
+    except TimeoutError:
+        needed = f"searching it takes more than {seconds} s of processor time: needed no repeats inside repeats"
+        raise _refused(path, f"{needed} (--pattern)") from None
     if not any(np.isfinite(window).any() for column in log.columns for window in column.windows):
         if not log.columns:
             return log

@@ -46,7 +46,7 @@ from verification.interrupts import second_ends
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, BAD_INPUT, INTERRUPTED, CRASH = 0, 2, 130, 70
 
-#: Done, but whoever read stdout left before the answer came: as the shell reports programs that SIGPIPE ends.
+#: Done, but the reader of stdout left before the answer came: as the shell reports programs that SIGPIPE ends.
 UNREAD = 141
 
 
@@ -195,8 +195,10 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
         return INTERRUPTED
     except Lost:
         return DONE
-    except SystemExit as error:  # click exits where any pipe is closed: not that of stdout or stderr
-        return _explain(error.__context__ or error)
+    except SystemExit as error:  # click exits for shells that complete, and where any pipe breaks: not stdout's
+        if isinstance(error.__context__, OSError):
+            return _explain(error.__context__)
+        return error.code if isinstance(error.code, int) else DONE
     except Exception as error:
         if seen:
             complain(interruption())
@@ -230,7 +232,7 @@ def _tracker() -> str:
     return urls.get("Issues", "the issue tracker of the repository that this copy came from")
 
 
-def _explain(error: BaseException) -> int:
+def _explain(error: Exception) -> int:
     """Bad input in one line; anything else is a bug and says so."""
     from verification.problem.tables import ProblemError
 

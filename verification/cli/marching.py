@@ -60,7 +60,7 @@ def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bo
         except KeyboardInterrupt:  # costs no increment
             found = replace(found, interrupted=True)
     warn(found.warnings)
-    deliver(found, sections, as_json, write, folder, typing=Typed(file=file, **changes).command)
+    deliver(found, sections, as_json, write, folder, typing=Typed(file=file, folder=folder, **changes).command)
     if found.ended or found.interrupted:
         complain(f"{found.ended or 'interrupted after the last increment'}: what was computed is kept")
     last = found.increments[-1].result

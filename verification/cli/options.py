@@ -147,7 +147,7 @@ STORE = click.option(
 class Typed:
     """A problem file and the changes by options, for the command that is suggested next.
 
-    ``keys`` are those of ``--set``, in their order.
+    ``keys`` are those of ``--set``, in their order; ``folder`` has the results, if they were written.
     """
 
     file: Path
@@ -155,12 +155,16 @@ class Typed:
     theta: str | None = None
     relaxation: str | None = None
     swap: bool = False
+    folder: Path | None = None
 
     def command(self, part: Next) -> str:
-        """The words of a command with the problem; empty if they could not be pasted."""
+        """The words of a command with the problem; empty if there is none, or they could not be pasted."""
         if not part.problem:
             return nothing_typed(part)
-        first, *options = part.words
+        done = self.folder is not None and "-o" in part.words
+        if done and not part.written:
+            return ""
+        first, *options = part.written if done else part.words
         words = ["ndtheory", first, self._place()]
         again = {option.partition("=")[0] for option in options}
         words += [word for key, value in self.keys.items() if key not in again for word in ("--set", f"{key}={value}")]

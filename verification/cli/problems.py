@@ -36,16 +36,33 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
 
 @click.command()
 @click.argument("name", required=False, shell_complete=_names)
+@click.option(
+    "--inputs",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER",
+    help="Write a file for each command that reads one: problems, a sweep, matrices, vectors and a log of a run.",
+)
 @JSON
-def example(name: str | None, as_json: bool) -> None:
+def example(name: str | None, inputs: Path | None, as_json: bool) -> None:
     """List the built-in problem files, or print one of them.
 
     \b
     Example:
       ndtheory example section6 > my.toml
+      ndtheory example --inputs trial
     """
     from verification.document import Document
 
+    written: Mapping[str, str] = {}
+    if inputs is not None:
+        if name is not None:
+            raise click.UsageError(f"received {name} and --inputs: needed one of them", click.get_current_context())
+        from verification.output.inputs import INPUTS, write_inputs
+
+        with stages() as tell:
+            tell("computing a run", None)
+            write_inputs(inputs)
+        written = {str(inputs / file): what for file, what in INPUTS.items()}
     available = examples()
     if name is not None and name not in available:
         from verification.problem.examples import unknown_example
@@ -59,9 +76,15 @@ def example(name: str | None, as_json: bool) -> None:
             units = {"length": "see each file", "stress": "see each file"}
 
             def content(self) -> dict[str, Any]:
+                if written:
+                    return {"written": written}
                 return {"examples": titles} if name is None else {"name": name, "toml": available[name]}
 
         say(Examples().to_json())
+    elif written:
+        for file, what in written.items():
+            say(f"{file}: {what}")
+        say(f"\nNext: ndtheory compare {quote(str((inputs or Path()) / 'my.toml'))}")
     elif name is None:
         for key, title in titles.items():
             say(f"  {key:14}  {title}")
@@ -194,7 +217,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
     warn(solution.warnings[len(bodies.warnings) :])
-    deliver(solution, run.solution, as_json, write, folder, typing=Typed(file=file, keys=keys).command)
+    deliver(solution, run.solution, as_json, write, folder, typing=Typed(file=file, keys=keys, folder=folder).command)
     return 0
 
 

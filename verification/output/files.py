@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from verification.document import Document
-from verification.interrupts import undisturbed
+from verification.interrupts import cleaned_up, undisturbed
 from verification.problem.tables import ProblemError, unreadable
 
 try:
@@ -123,7 +123,7 @@ def staged(folder: Path, stale: Collection[str] = (), *, shown: Path | None = No
     nothing to replace.  A ProblemError names ``shown``, by default the folder.
     """
     try:
-        with contextlib.ExitStack() as stack:
+        with cleaned_up(), contextlib.ExitStack() as stack:
             with _held(folder):
                 _sweep(folder)
                 room = Path(tempfile.mkdtemp(prefix=ROOM, dir=folder))

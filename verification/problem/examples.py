@@ -46,6 +46,11 @@ def unknown_example(name: str, available: Iterable[str]) -> str:
     return f"no example {short(name)!r}; there are {', '.join(known)}{did_you_mean(name, known)}"
 
 
+def instead_of(path: str) -> str:
+    """Return what to type for a file that is missing and has the name of a built-in problem; empty for another name."""
+    return f"; type ndtheory example {path} > {path}.toml for the built-in problem" if path in examples() else ""
+
+
 def example(name: str) -> Problem:
     """A built-in problem.
 

@@ -8,6 +8,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+from verification.problem.examples import instead_of
 from verification.problem.specification import Problem
 from verification.problem.tables import LARGEST, ProblemError, short, unreadable
 
@@ -63,7 +64,7 @@ def read_file(path: Path | str) -> dict[str, Any]:
     path = Path(path)
     refused = lambda why: ProblemError(str(path), "", None, why)
     if why := unreadable(path, MOST_BYTES):
-        raise refused(why)
+        raise refused(why + ("" if path.exists() else instead_of(str(path))))
     try:
         content = path.read_bytes()
         wide = content.startswith((b"\xff\xfe", b"\xfe\xff"))  # `ndtheory example > my.toml` in a PowerShell writes so

@@ -29,11 +29,12 @@ def sections(found: History) -> Sections:
     """The sections."""
     first = found.increments[0].result
     nodes = sum(len(body.mesh.points) for body in first.bodies.elastic)
+    after = following("march", "-o", "results", written=("explore", "-o", "page.html"))
     return (
         setting(found.problem, nodes, len(found.increments[0].contact.x)),
         section("history", "WHAT HAPPENED", *_happened(found), caption=STEPS, pictures=PICTURES),
         *([section("promise", PROMISE, *_promised(found))] if found.method == "iteration" else []),
-        limits(found.outside, then(found.increments[-1].result, "march", following("march", "-o", "results"))),
+        limits(found.outside, then(found.increments[-1].result, "march", after)),
     )
 
 

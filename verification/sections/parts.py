@@ -109,20 +109,20 @@ class Next(Shown):
     """A command to type next: a text, or a command and its options.
 
     With ``problem`` it is about the problem that was typed, with ``iteration`` also its theta, relaxation and roles;
-    with
-    ``exchanged`` it exchanges the roles.
+    with ``exchanged`` it exchanges the roles.  ``written`` replaces a command with -o whose files are there already.
     """
 
     words: tuple[str, ...]
     problem: bool = False
     iteration: bool = False
     exchanged: bool = False
+    written: tuple[str, ...] = ()
     only: Place | None = field(default="terminal", kw_only=True, repr=False)
 
 
-def following(*words: str, iteration: bool = False, exchanged: bool = False) -> Next:
+def following(*words: str, iteration: bool = False, exchanged: bool = False, written: tuple[str, ...] = ()) -> Next:
     """A command for the problem that was typed."""
-    return Next(words, problem=True, iteration=iteration, exchanged=exchanged)
+    return Next(words, problem=True, iteration=iteration, exchanged=exchanged, written=written)
 
 
 @dataclass(frozen=True)

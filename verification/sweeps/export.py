@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -104,7 +106,9 @@ def dataset(sweep: Sweep) -> xarray.Dataset:
 
 def write_dataset(sweep: Sweep, path: Path) -> None:
     """Write the dataset as netCDF 4; errors as for :func:`dataset`."""
-    dataset(sweep).to_netcdf(path, engine="netcdf4")
+    with tempfile.TemporaryDirectory() as room:  # the library writes only where names are UTF-8
+        dataset(sweep).to_netcdf(f"{room}/sweep.nc", engine="netcdf4")
+        shutil.copyfile(f"{room}/sweep.nc", path)
 
 
 def _plain(value: Any) -> Any:
