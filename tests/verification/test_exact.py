@@ -122,6 +122,18 @@ def leaves(tree):
     return [tree] if isinstance(tree, Leaf) else [leaf for part in tree.cases for leaf in leaves(part)]
 
 
+def test_no_set_of_pieces_is_divided_twice_at_one_node_in_the_same_way():
+    def paths(tree, before):
+        if isinstance(tree, Leaf):
+            return [before]
+        return [path for part in tree.cases for path in paths(part, [*before, (tree.name, tree.node)])]
+
+    pair = vf.build(two_blocks())
+    found = paths(enclose(pair, QuadraticForms(pair, vf.measure(pair)), 0.5, gap=1e-9, programs=12).tree, [])
+    assert max(map(len, found)) > 2
+    assert all(len(path) == len(set(path)) for path in found)
+
+
 class Loose(QuadraticForms):
     """Proofs that are worse for a part of the pieces than for all of them, as a solver's may be, or none."""
 
