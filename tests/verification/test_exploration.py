@@ -83,10 +83,10 @@ def test_factors_are_those_of_a_comparison(found, data):
 
 def test_the_line_of_the_bound_is_that_of_the_bound_at_each_friction(found, data):
     """The page multiplies kappa by the friction that is shown."""
-    for role, film in zip(data["roles"], found.films, strict=True):
+    for role, each in zip(data["roles"], found.films, strict=True):
         for k in data["friction"]:
             if k:
-                constants = film.measured.with_friction(k).energy_constants()
+                constants = each.measured.with_friction(k).energy_constants()
                 expected = [float(constants.kappa_1), float(constants.kappa_2)]
                 assert [k * kappa for kappa in role["kappa"]] == pytest.approx(expected)
 
