@@ -13,9 +13,7 @@ import numpy as np
 
 from ndtheory import __version__
 from ndtheory.energy_norms import one_minus_square, predicted_factor, predicted_theta
-from ndtheory.number import directed
 from verification.algorithm.runs import run
-from verification.algorithm.theta import below_one
 from verification.bounds.bound import Region
 from verification.bounds.table import named
 from verification.constants import measure
@@ -36,6 +34,9 @@ from verification.progress import Progress, silent
 #: Multiples of the problem's friction that are run; without friction, the frictions themselves.
 SHARES = tuple(Fraction(n, 4) for n in (0, 2, 4, 6, 8))
 FRICTIONS = tuple(Fraction(n, 10) for n in (0, 1, 2, 4))
+
+#: The largest theta of the grid in three digits.
+CLOSEST_TO_ONE = 0.999
 
 #: The formulas that the page evaluates, by their names in JavaScript.
 FORMULAS = (
@@ -235,7 +236,7 @@ def _grid(pair: ContactPair, problem: Problem, progress: Progress) -> Exploratio
         why = str(error)
     measured = [measure(each) for each in pairs]
     rhos = [one.rho_max for one in measured if one.rho_max is not None]
-    predicted = (Fraction(directed(below_one(predicted_theta(rho.value)), 3, up=False)) for rho in rhos)
+    predicted = (Fraction(f"{min(float(predicted_theta(rho.value)), CLOSEST_TO_ONE):.3g}") for rho in rhos)
     thetas = tuple(sorted({made.theta, *predicted, *(Fraction(n, 20) for n in range(1, 20))}))
     frictions = _frictions(pair)
     films = [

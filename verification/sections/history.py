@@ -68,7 +68,8 @@ def _happened(found: History) -> Iterable[Shown | str]:
         yield f"normal force in {units['stress']} (per unit area)"
     if found.ended:
         yield Note(f"{found.ended}.", lead="Not whole:")
-        yield from unfinished(found.increments[-1].result)
+        if (last := found.increments[-1].run) is not None and last.unfinished:
+            yield from unfinished(last, f"the end of increment {len(found.increments)}")
 
 
 def _range(numbers: Sequence[int | None]) -> Cell:

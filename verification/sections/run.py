@@ -61,14 +61,14 @@ def then(finished: Run | Solution, command: str, otherwise: Next) -> Next:
     return following(command, *(() if finished.remedy is None else finished.remedy.options), iteration=True)
 
 
-def unfinished(finished: Run | Solution) -> list[Shown]:
-    """The head of values that do not solve the problem, with the change to try, which a command reports on stderr."""
-    if isinstance(finished, Solution) or not finished.unfinished:
-        return []
-    head = Note("", lead=f"{finished.unfinished.capitalize()}:")
-    if finished.remedy is None:
-        return [head]
-    return [head, *(Note(f"{finished.remedy.sentence()}.", only=place) for place in ("notebook", "report"))]
+def unfinished(finished: Run, first: str = "") -> list[Shown]:
+    """The head of values that do not solve the problem, with the first of them, and the change to try.
+
+    A command reports that change on stderr.
+    """
+    said = "" if finished.remedy is None else f"{finished.remedy.sentence()}."
+    advice: list[Shown] = [Note(said, only=place) for place in ("notebook", "report") if said]
+    return [*advice, Note(first, lead=f"{finished.unfinished.capitalize()}:")]
 
 
 def happened(finished: Run, *, alone: bool) -> Section:
@@ -106,7 +106,8 @@ def happened(finished: Run, *, alone: bool) -> Section:
         chosen = f"theta = {float(finished.theta):.4g} is the {finished.choice.source} one"
         parts.append(f"{chosen}: {finished.choice.why}")
     parts += _grids(problem, finished.pair.contact_body, finished.pair.interface)
-    parts += unfinished(finished)
+    nodes = _nodes(problem, finished.contact)
+    parts += unfinished(finished, nodes) if finished.unfinished else [Labelled("nodes", nodes)]
     parts += _contact(problem, finished.contact, f"; KKT residual of step II {finished.last.contact.kkt.residual:.1e}")
     parts.append(Note(_at_the_end(finished), only="report"))
     return section("run", "WHAT HAPPENED", *parts, caption=RATES, pictures=PICTURES)
@@ -137,7 +138,8 @@ def solution(found: Solution) -> Sections:
     bodies = found.bodies
     problem = bodies.problem
     then = following("run") if len(bodies.elastic) == 2 else following("solve", "-o", "results")
-    parts = (*_grids(problem, problem.contact_body, bodies.interface), *_contact(problem, found.contact))
+    nodes = Labelled("nodes", _nodes(problem, found.contact))
+    parts = (*_grids(problem, problem.contact_body, bodies.interface), nodes, *_contact(problem, found.contact))
     certified = f"KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c"
     return (
         setting(problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n),
@@ -157,17 +159,21 @@ def _grids(problem: Problem, contact_body: int, interface: Interface) -> list[Sh
     return [Labelled("contact grid", counts)]
 
 
-def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list[Shown]:
-    """States and forces along Gamma_c, in totals, and the residual of step II."""
-    units, total = problem.units, contact.force
-    normal = f"{figures(total['normal'], 6)} normal"
+def _nodes(problem: Problem, contact: ContactFields) -> str:
+    """The number of nodes in each state."""
     states = contact.pattern
     if not problem.contact.friction:
         states = {"closed": states["stick"] + states["slip"], "open": states["open"]}
     counts = ", ".join(f"{number} {name}" for name, number in states.items())
-    nodes = Labelled("nodes", f"{counts}: nothing touches" if contact.apart else counts)
+    return f"{counts}: nothing touches" if contact.apart else counts
+
+
+def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list[Shown]:
+    """Forces along Gamma_c, in totals, and the residual of step II."""
+    units, total = problem.units, contact.force
+    normal = f"{figures(total['normal'], 6)} normal"
     if problem.dimension == 1:
-        return [nodes, Labelled("force", f"{normal}, {units['stress']}{solved}")]
+        return [Labelled("force", f"{normal}, {units['stress']}{solved}")]
     rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
     tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
     unit = f"{units['stress']} {units['length']} (per unit thickness)"
@@ -182,4 +188,4 @@ def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list
         one, other = each["bodies"]
         words = f"{figures(each['normal'], 6)} normal, {figures(each['tangential'])} tangential"
         totals.append(Labelled(f"{one} on {other}", words))
-    return [nodes, *totals, Labelled("largest pressure", f"{pressure} {units['stress']}{solved}")]
+    return [*totals, Labelled("largest pressure", f"{pressure} {units['stress']}{solved}")]
