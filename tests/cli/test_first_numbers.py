@@ -213,7 +213,7 @@ def test_a_reader_that_goes_away_costs_no_file(write, tmp_path):
     found = ended(SKETCHED, "compare", write("without friction"), "-o", tmp_path / "results", stdout=writer)
     os.close(writer)
     strained, written = found.stderr.splitlines()
-    assert (found.returncode, written) == (0, f"written: {tmp_path / 'results'}")
+    assert (found.returncode, written) == (0, f"written: {tmp_path / 'results'}")  # which have the answer
     assert strained.startswith("warning: the largest principal strain is 5.1 %")
     assert (tmp_path / "results" / "report.html").exists()
 

@@ -58,6 +58,7 @@ class _Stdout:
 
     stream: TextIO | None = None
     errors: list[OSError] = field(default_factory=list)
+    kept: bool = False
     live: Live | None = None
     said: bool = False
 
@@ -117,6 +118,7 @@ def steady(*, last: bool) -> Iterator[None]:
         os.set_inheritable(number, True)  # as the numbers of standard streams are
     os.close(number)
     _stdout.errors.clear()
+    _stdout.kept = False
     before = sys.stdout, sys.stderr
     for name, number, errors in (("stdout", 1, _stdout.errors), ("stderr", 2, [])):
         stream: TextIO | None = getattr(sys, name)
@@ -133,9 +135,10 @@ def steady(*, last: bool) -> Iterator[None]:
 
 
 def lost() -> OSError | None:
-    """The error that kept a part of the result from being written; None if there was none."""
+    """The error by which a part of the result was lost; None if there was none, or nobody reads what files have."""
     sys.stdout.flush()
-    return next(iter(_stdout.errors), None)
+    unread = lambda error: gone(error) or error.errno == errno.EBADF  # closed
+    return next((error for error in _stdout.errors if not (_stdout.kept and unread(error))), None)
 
 
 def say(text: str, *, bold: bool = False) -> None:
@@ -263,6 +266,7 @@ def deliver(
         with stages() as tell:
             tell(f"drawing and writing {folder}", None)
             write(document)
+        _stdout.kept = True
     except KeyboardInterrupt:
         complain(f"interrupted while {folder} was written; the result is shown above")
         raise Interrupted from None
