@@ -197,6 +197,27 @@ def test_contact_that_opens_and_closes_is_recognised():
     assert "open nodes as well" in str(found["0.6"].sections())
 
 
+def test_four_iterates_after_contact_has_changed_are_enough_and_are_the_last_ones():
+    coupling, X = Linear([0.5, 2.0, 8.0]), np.random.default_rng(3).normal(size=(7, 3))
+    TX = np.array([coupling(x) for x in X])
+    TX[:3, 0] = 0.0  # open in the first three
+    seen = seen_in(X, TX)
+    assert (seen.iterates, seen.used, seen.changing, seen.settled) == (7, 4, True, True)
+    assert np.sort(seen.ritz.real) == pytest.approx([0.5, 2.0, 8.0])
+    assert seen_in(X[:6], TX[:6]).used == 6  # three are too few
+    assert not seen_in(X[:6], TX[:6]).settled
+
+
+def test_no_difference_is_taken_across_the_begin_of_a_step_in_time():
+    coupling, X = Linear([0.5, 2.0, 8.0]), np.random.default_rng(4).normal(size=(9, 3))
+    TX, starts = np.array([coupling(x) for x in X]), np.arange(9) == 5
+    TX[5:] += [1.0, -2.0, 3.0]  # the load of the next step
+    TX[:2, 0] = 0.0  # and contact changes in the first one
+    seen = seen_in(X, TX, starts=starts)
+    assert seen.used == 7
+    assert np.sort(seen.ritz.real) == pytest.approx([0.5, 2.0, 8.0])
+
+
 def test_ends_of_exchanged_roles_are_reciprocal():
     one = Spectrum.of([0.5, 2.0, 8.0])
     assert one.exchanged().values.real == pytest.approx([1 / 8, 1 / 2, 2])
