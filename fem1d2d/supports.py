@@ -110,10 +110,10 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
     return np.asarray(orthonormal.reshape(n, d, kernel.shape[1]))
 
 
-def pieces(mesh: Mesh) -> NDArray[np.int64]:
-    """The piece of each cell, shape (c,): cells that share a facet lie in the same one."""
+def pieces(mesh: Mesh, *, hinged: bool = False) -> NDArray[np.int64]:
+    """The piece of each cell, shape (c,): cells that share a facet lie in the same one; if ``hinged``, or a node."""
     c = len(mesh.cells)
-    facets = mesh.cells.T.reshape(-1, 1) if mesh.dimension == 1 else edges(mesh.cells)
+    facets = mesh.cells.T.reshape(-1, 1) if hinged or mesh.dimension == 1 else edges(mesh.cells)
     facet = undirected(facets, len(mesh.points))
     order = np.argsort(facet, kind="stable")  # cells that share a facet become neighbours
     shared = facet[order[1:]] == facet[order[:-1]]

@@ -118,7 +118,7 @@ BUDGET = {
     "verification.coupling": 443,
     "verification.exploration": 696,
     "verification.figures": 1662,
-    "verification.interface": 3986,
+    "verification.interface": 3993,
     "verification.ledger": 4466,
     "verification.output": 600,
     "verification.problem": 2315,

@@ -97,11 +97,16 @@ def test_a_document_is_written_last_and_alone(write, capfd, monkeypatch):
 
 @pytest.mark.parametrize("edits", [None, "without friction", "held tangentially", "wrong roles", "apart"], ids=str)
 def test_the_parts_make_the_view_of_a_notebook(call, write, edits):
+    """A command says on stderr which change may let a run converge, a notebook among the parts."""
     file = write(edits)
     *shown, following = call("compare", file).out.splitlines()
     assert following.startswith("Next: ")
     view = vf.compare(vf.load(file))._repr_html_()
-    assert html.unescape(view.removeprefix("<pre>").removesuffix("</pre>")).splitlines() == shown
+    lines = html.unescape(view.removeprefix("<pre>").removesuffix("</pre>")).splitlines()
+    added = [line for line in lines if line not in shown]
+    assert [line for line in lines if line not in added] == shown
+    assert ("does not contract here; try theta =" in " ".join(added)) == (edits == "wrong roles")
+    assert bool(added) == (edits == "wrong roles")
 
 
 def test_a_listener_hears_what_the_comparison_then_holds(write):

@@ -94,18 +94,18 @@ def test_what_has_no_best_theta_says_why():
     assert (short.seen, short.reason["seen"]) == (None, "no run arrived")
 
 
-def test_bodies_without_rho_have_no_best_theta():
-    sides = vf.Problem.from_dict(
+def test_a_body_that_friction_alone_keeps_from_sliding_has_no_best_theta():
+    block = {"shape": "rectangle", "x": [0, 1], "cells": [2, 2], "young": 1, "poisson": 0.3}
+    sliding = vf.Problem.from_dict(
         {
-            "body1": {"shape": "rectangle", "x": [0, 1], "y": [-1, 0], "cells": [2, 2], "young": 1, "poisson": 0.3}
-            | {"fixed": ["bottom"], "prescribed": {"left": [0, "free"]}},
-            "body2": {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [2, 2], "young": 1, "poisson": 0.3}
-            | {"prescribed": {"top": [0, "-0.1"]}},
-            "contact": {"friction": 0},
+            "body1": block | {"y": [-1, 0], "fixed": ["bottom"]},
+            "body2": block | {"y": [0, 1], "prescribed": {"top": ["free", "-0.1"]}},
+            "contact": {"friction": "0.1", "radius": 1},
+            "iteration": {"neumann_body": 1},
         }
     )
-    with pytest.raises(ValueError, match="needed bodies that have rho"):
-        best_theta(sides)
+    with pytest.raises(ValueError, match="the theorem in energy norms does not apply"):
+        best_theta(sliding)
 
 
 def test_a_curve_of_the_figure_ends_where_its_proof_does(small):

@@ -30,7 +30,7 @@ LARGEST = 1_500_000
 ROUNDED = 1 / 100
 
 #: Rounding to the nearest 127th, and of its size to four digits.
-NEAREST = 0.51 / 127
+NEAREST = 0.5 / 127 + 0.5e-3
 
 
 @pytest.fixture(scope="module")

@@ -126,6 +126,7 @@ ROUNDING = {
     "unrelaxed_residual",
     "coupled_residual",
     "observed_rate_interval",
+    "step_ratio",
     "observed_rate",
 }
 

@@ -12,7 +12,7 @@ import verification as vf
 from fem1d2d import rectangle
 
 
-def test_what_hangs_on_a_hinge_where_no_contact_node_feels_it_is_refused(tmp_path) -> None:
+def test_what_hangs_on_a_hinge_where_no_contact_node_feels_it_is_refused_by_the_iteration(tmp_path) -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 1, 0], [2, 2, 0]], dtype=float)
     lines, triangles = np.array([[3, 2], [2, 1]]), np.array([[0, 1, 2], [0, 2, 3], [2, 4, 5]])
     tags = [np.array([1, 2]), np.array([9, 9, 9])]
@@ -26,7 +26,7 @@ def test_what_hangs_on_a_hinge_where_no_contact_node_feels_it_is_refused(tmp_pat
     meshio.write(tmp_path / "flag.msh", mesh, file_format="gmsh22", binary=False)
     upper = {"mesh": str(tmp_path / "flag.msh"), "young": 1, "poisson": 0, "prescribed": {"top": [0, "-0.01"]}}
     flag = blocks(iteration={"neumann_body": 1}, contact={"interval": [0, 1]}) | {"body2": upper}
-    for call in (vf.run, vf.solve):
+    for call in (vf.run, vf.advise):
         with pytest.raises(vf.ProblemError, match=r"body2: the piece at x = 1 to 2 and y = 1 to 2 can move rigidly"):
             call(vf.Problem.from_dict(flag))
 

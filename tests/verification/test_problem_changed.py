@@ -259,7 +259,7 @@ def test_a_built_in_problem_is_had_by_its_name():
 @pytest.mark.parametrize("name", ["", "section7", "section6.toml", "../section6"])
 def test_an_unknown_name_is_answered_with_the_known_ones(name):
     with pytest.raises(
-        ValueError, match=f"no example '{name}'; there are chain, inside, .*, section6-60, .*, stack, two-bars"
+        ValueError, match=f"no example '{name}'; there are chain, history, inside, .*, section6-60, .*, stack, two-bars"
     ):
         vf.example(name)
 

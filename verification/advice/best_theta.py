@@ -136,7 +136,7 @@ def best_theta(
     Raises
     ------
     ValueError
-        rho does not exist.
+        The theorem in energy norms does not apply.
 
     Examples
     --------
@@ -155,7 +155,7 @@ def best_theta(
     measured = measure(pair)
     energy = energy_bounds(measured)
     if energy is None:
-        raise ValueError(f"needed bodies that have rho: {measured.why_no_energy}")
+        raise ValueError(f"the theorem in energy norms does not apply: {measured.why_no_energy}")
     rho, predicted = float(energy.rho.value), energy.theta_predicted
     outside = pair.outside[0] if pair.outside else ""
     reason: dict[str, str] = {}

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem1d2d import (
     Mesh,
@@ -95,12 +94,12 @@ def _or_solve(name: str) -> str:
     return f"more sides of {name}, or use `ndtheory solve`"
 
 
-def _moved(body: Body, motions: Floats) -> NDArray[np.bool_]:
-    """Return the cells that some of these motions of the unknowns move, shape (c,)."""
+def _moved(body: Body, motions: Floats) -> Nodes:
+    """Return the nodes of the cells that some of these motions of the unknowns move, shape (c, corners)."""
     everywhere = np.zeros((body.known.held.size, motions.shape[1]))
     everywhere[body.positions] = motions if body.turned is None else body.turned.T @ motions
     moves = np.abs(everywhere).max(axis=1, initial=0.0).reshape(-1, body.mesh.dimension).max(axis=1) > STILL
-    return np.asarray(moves[body.mesh.cells].any(axis=1))
+    return np.asarray(moves[body.mesh.cells])
 
 
 def _loose(problem: Problem, body: Body) -> list[int]:
@@ -109,15 +108,22 @@ def _loose(problem: Problem, body: Body) -> list[int]:
     return [i for i in problem.numbers(int(body.name[-1])) if moved[body.mesh.surfaces[f"body{i}"]].any()]
 
 
-def _check_pieces(problem: Problem, body: Body) -> None:
-    """Refuse a body with a piece that can move though neither the body's supports nor its contact nodes do."""
+def _check_pieces(problem: Problem, body: Body, *, hinged: bool) -> None:
+    """Refuse a body with a piece that can move where neither its supports nor its contact nodes feel it.
+
+    The global method takes a piece that hangs on a node of another one, as its turning changes no force: ``hinged``.
+    """
     if body.motion_traces.shape[1] == body.motions.shape[1]:
         return
     _, values, right = np.linalg.svd(body.motions[body.interface], full_matrices=False)
     felt = right[values > STILL]
-    moved = _moved(body, body.motions - body.motions @ felt.T @ felt)
-    piece = pieces(body.mesh)
-    first = int(np.argmax(moved))
+    moved, piece = _moved(body, body.motions - body.motions @ felt.T @ felt), pieces(body.mesh, hinged=hinged)
+    loose = moved.any(axis=1)
+    if hinged:
+        loose &= ~np.isin(piece, piece[~moved.all(axis=1)])
+        if not loose.any():
+            return
+    first = int(np.argmax(loose))
     corners = body.mesh.points[body.mesh.cells[piece == piece[first]]].reshape(-1, body.mesh.dimension)
     ends = zip("xy", corners.min(axis=0), corners.max(axis=0), strict=False)
     where = " and ".join(f"{axis} = {low:.6g} to {high:.6g}" for axis, low, high in ends)
@@ -281,6 +287,7 @@ def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
     """Refuse bodies that the iteration cannot take: contact may hold the contact body, and no other."""
     problem = bodies.problem
     for body in bodies.elastic:
+        _check_pieces(problem, body, hinged=False)
         if not body.motions.shape[1]:
             continue
         if int(body.name[-1]) == problem.iteration.neumann_body:
@@ -333,7 +340,7 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         body1=body1, body2=body2, interface=interface, friction=problem.contact.friction, problem=problem
     )
     for body in bodies.elastic:
-        _check_pieces(problem, body)
+        _check_pieces(problem, body, hinged=True)
     if len(bodies.elastic) == 2 and _move_together(bodies):
         which = "bodies that touch" if problem.contact.lines else "body1 and body2"
         needed = f"{which} can move rigidly together, each held only by the other: fix or prescribe some sides"

@@ -64,7 +64,7 @@ def read_file(path: Path | str) -> dict[str, Any]:
     path = Path(path)
     refused = lambda why: ProblemError(str(path), "", None, why)
     if why := unreadable(path, MOST_BYTES):
-        raise refused(why + ("" if path.exists() else instead_of(str(path))))
+        raise refused(why + instead_of(str(path)))
     try:
         content = path.read_bytes()
         wide = content.startswith((b"\xff\xfe", b"\xfe\xff"))  # `ndtheory example > my.toml` in a PowerShell writes so
