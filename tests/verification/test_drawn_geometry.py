@@ -172,8 +172,7 @@ def test_no_steep_body_is_advised_where_the_contact_body_has_no_nodes_at_the_end
     assert "let body 1 have the Neumann problem" not in str(refusal.value)
 
 
-@pytest.mark.parametrize("digits", [6, 5])
-@pytest.mark.parametrize("way", [-1, 1])
+@pytest.mark.parametrize(("digits", "way"), [(6, 1), (5, -1)])
 def test_an_interval_ends_at_the_node_that_its_printed_digits_mean(digits, way, tmp_path):
     """A message prints six digits of the position of a node, and takes them again."""
     low = {

@@ -349,7 +349,7 @@ def test_no_state_with_a_number_that_is_none_has_a_certificate() -> None:
 @pytest.mark.parametrize("sizes", [(1e290, 1.0, 1e9), (1.0, 1e300, 1e9), (1.0, 1.0, 1e300), (1e-300, 1e150, 1.0)])
 def test_a_system_of_any_size_is_solved_with_its_certificate_or_refused_without_a_warning(sizes) -> None:
     stiff, far, rough = sizes
-    for seed in range(4):
+    for seed in range(2):
         random = np.random.default_rng(seed)
         n = random.integers(1, 4)
         root = random.normal(size=(2 * n, 2 * n))
