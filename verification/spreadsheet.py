@@ -19,8 +19,9 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _IN_CELL = re.compile(rf"(?=\s*[{FORMULA}])(?!{_NUMBER}$)")
 
 #: The same behind a comma or a semicolon of a line of words: behind a number brackets may close, and then comes the
-#: same separator or the end (with semicolons between the cells, the cell of ``;-1,`` is ``-1,`` and no number).
-_IN_LINE = re.compile(rf"(([,;])[\s\"']*)(?!{_NUMBER}[\s\"'\]}}]*(?:\2|$))([{FORMULA}])")
+#: same separator or the end (with semicolons between the cells, the cell of ``;-1,`` is ``-1,`` and no number; behind a
+#: quote the cell may go on in the next line).
+_IN_LINE = re.compile(rf"(([,;])(?:\s*(?!{_NUMBER}[\s\]}}]*(?:\2|$))|[\s\"']*[\"'][\s\"']*))([{FORMULA}])")
 
 
 def as_csv(head: Sequence[str], columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

@@ -234,6 +234,7 @@ def test_no_cell_of_a_table_is_a_formula_and_numbers_stay(rows, name):
 
 @given(st.lists(st.text("=+-@,; 1e.'\"\\ab#[]", max_size=12), min_size=3, max_size=3))
 @example(["", "", ";-1,"])  # between semicolons the cell is "-1,"
+@example(["", "", ';"-1'])  # a quote that opens a cell may close in another line
 def test_lines_above_a_table_have_no_formula_and_stay_toml(texts):
     problem = vf.example("two-bars").to_dict() | {
         "title": texts[0],
