@@ -54,7 +54,7 @@ MISSION: dict[str, tuple[str, ...]] = {
 
 #: Drawn mutants by module, each with the reason why no test can notice it.
 EQUIVALENT: dict[str, dict[str, str]] = {
-    "fem1d2d/line.py": {"Line.along: 1 - SAME ** 2 / 2 -> 1": "as a double it is 1"},
+    "fem1d2d/line.py": {"_directions: 1 - SAME ** 2 / 2 -> 1 + SAME ** 2 / 2": "as doubles both are 1"},
     "fem1d2d/trace.py": {
         "_hats: len(grid) - 2 -> len(grid) + 2": "no segment begins at the last node, whose cell would be beyond"
     },
