@@ -218,7 +218,7 @@ class TwoBodies(Value):
 def reasons_outside(interface: Interface, friction: Fraction, free: Mapping[int, Nodes]) -> list[str]:
     """Return why the theorem does not apply; ``free`` has, by body, the contact components that supports leave free.
 
-    Half of a symmetric model stands for the whole, and its planes of symmetry are no reason.
+    Half of a symmetric model stands for the whole: its planes of symmetry do not count.
     """
     reasons = []
     if friction and interface.law is not None and interface.law.outside:
