@@ -109,7 +109,7 @@ BUDGET = {
     "ndtheory": 5935,
     "verification": 2141,
     "verification.advice": 6446,
-    "verification.algorithm": 2451,
+    "verification.algorithm": 2455,
     "verification.bounds": 3813,
     "verification.certificate": 1450,
     "verification.cli": 2686,

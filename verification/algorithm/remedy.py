@@ -32,7 +32,7 @@ class Remedy:
     formula : str
         The formula of that theta; may be empty.
     exchanged : str or None
-        A theta for exchanged roles where that is larger, empty where it is unknown; None where that is not advised.
+        A theta for exchanged roles where that is larger; None where that is not advised.
     constant : bool
         True if the rule of the run takes no theta, so that the advice is about constant relaxation.
     """
@@ -57,7 +57,7 @@ class Remedy:
         rule = "constant relaxation with " if self.constant else ""
         advice = self.advice or f"try {rule}{theta} {self.value}{self.formula}"
         if self.exchanged is not None:
-            advice += f", or {roles}" + (f" with {theta} {self.exchanged}" if self.exchanged else "")
+            advice += f", or {roles} with {theta} {self.exchanged}"
         return f"{self.why}; {advice}"
 
 
@@ -89,39 +89,41 @@ def remedy_of(
         if most + left <= LONGEST:
             longer = str(2 * (most + math.ceil(left)))  # the rate may still rise
             return Remedy(why=why, key="iteration.max_iterations", value=longer, advice=advice)
-        return Remedy(why=why, value=_typed(_worth_trying(pair) or theta / 2), advice=advice, constant=constant)
+        return Remedy(why=why, value=_typed(_worth_trying(_rho(pair))), advice=advice, constant=constant)
     if last.residual <= CLEAR_OF_NOISE * noise(pair, last):
         why, advice = (
             f"{outcome}: the residual fell to rounding, {reached:.1e}",
             "the tolerance must be larger than that",
         )
         return Remedy(why=why, key="iteration.tolerance", value=f"{10 * reached:.0e}", advice=advice)
-    good = _worth_trying(pair)
+    rho = _rho(pair)
+    good = _worth_trying(rho)
     if theta < 1e-9:
         why = f"{outcome}: a step of theta = {theta:g} is lost in rounding"
-        return Remedy(why=why, value=_typed(good or 0.1), advice="try a larger theta", constant=constant)
+        return Remedy(why=why, value=_typed(good), advice="try a larger theta", constant=constant)
     why = f"{outcome}: theta = {theta:g} does not contract here"
     if outcome == "limit":
         why = "not converged: max_iterations was reached far from a state of contact"
     try:
-        other = _worth_trying(pair.swapped()) or 0.0
+        other = _worth_trying(_rho(pair.swapped()))
     except ValueError:  # these roles are refused; problem errors are such
-        other = None
-    if good is None:
-        exchanged = None if other is None else ""
-        advice = "try a smaller theta"
-        return Remedy(why=why, value=_typed(theta / 2), advice=advice, exchanged=exchanged, constant=constant)
-    exchanged = None if other is None or other <= good else _typed(other)
+        other = 0.0
+    exchanged = _typed(other) if other > good else None
     if theta <= good:
         return Remedy(why=why, value=_typed(theta / 2), exchanged=exchanged, constant=constant)
-    formula = f" (2/(2 + rho), rho = {2 / good - 2:.3g})"
+    formula = f" (2/(2 + rho), rho = {rho:.3g})"
     return Remedy(why=why, value=_typed(good), formula=formula, exchanged=exchanged, constant=constant)
 
 
-def _worth_trying(pair: ContactPair) -> float | None:
-    """Return 2/(2 + rho), and below 1 when it is written with a few figures; None where rho is unknown."""
+def _rho(pair: ContactPair) -> float:
     rho = measure(pair).rho_max
-    return None if rho is None else min(2 / (2 + rho.value), 0.99)
+    assert rho is not None  # a pair has interface matrices
+    return rho.value
+
+
+def _worth_trying(rho: float) -> float:
+    """Return 2/(2 + rho), and below 1 when it is written with a few figures."""
+    return min(2 / (2 + rho), 0.99)
 
 
 def _typed(theta: float) -> str:

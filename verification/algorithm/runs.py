@@ -223,8 +223,10 @@ class Run(Document):
         pair, solved = self.pair, iterate.contact
         turned = np.ones(len(solved.v))
         turned[pair.contact.grid.tangential] = pair.normal_sign  # to body 1 against body 2
-        beside = pair.interface.carry(iterate.displacement) - pair.interface.shown.carry(iterate.displacement)
-        force, jump = turned * solved.force, turned * (solved.v + beside)
+        shown, v = pair.interface.shown, solved.v
+        if shown is not pair.interface:
+            v = v + pair.interface.carry(iterate.displacement) - shown.carry(iterate.displacement)
+        force, jump = turned * solved.force, turned * v
         return ContactFields.of(
             pair.interface, force=force, bound=pair.bound(iterate.g), jump=jump, state=solved.pattern
         )
