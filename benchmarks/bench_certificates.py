@@ -20,10 +20,10 @@ from recording import Record, options, report, row
 from timing import in_turn
 
 import verification as vf
-from verification.bounds.multipliers import QuadraticForms
 from verification.certificate import check
 from verification.certificate.claims import NoCertificate
 from verification.ledger.cases import problem as random_problem
+from verification.semidefinite.multipliers import QuadraticForms
 
 #: Contact nodes and rounds.
 SIZES = {7: 5, 13: 5, 25: 3, 49: 1}

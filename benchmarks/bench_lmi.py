@@ -14,12 +14,12 @@ from recording import Record, options, report, row
 from timing import in_turn, timed
 
 import verification as vf
-from verification.bounds import interior_point, model
-from verification.bounds.interior_point import LMIError, Optimum, Program
-from verification.bounds.lipschitz import GAP, budget, enclose
-from verification.bounds.losses import locate
-from verification.bounds.multipliers import QuadraticForms, friction_threshold
 from verification.ledger.cases import problem as random_problem
+from verification.semidefinite import interior_point, model
+from verification.semidefinite.interior_point import LMIError, Optimum, Program
+from verification.semidefinite.lipschitz import GAP, budget, enclose
+from verification.semidefinite.losses import locate
+from verification.semidefinite.multipliers import QuadraticForms, friction_threshold
 
 THETA = 0.7
 

@@ -25,11 +25,11 @@ from contraction_truth import Truth, condensed, doubles, number
 from joblib import Parallel, delayed
 
 import verification as vf
-from verification.bounds.interior_point import LMIError
-from verification.bounds.multipliers import QuadraticForms
 from verification.certificate import check
 from verification.certificate.claims import NoCertificate
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
+from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite.multipliers import QuadraticForms
 
 # --- what is put forward ----------------------------------------------------------------------------------------------
 

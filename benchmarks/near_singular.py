@@ -27,11 +27,11 @@ import numpy as np
 import scipy.sparse as sp
 from joblib import Parallel, delayed
 
-from fem1d2d.enclosed import Enclosed
-from fem1d2d.loewner import Elimination, positive_definite
 from fem1d2d.mesh import Floats
-from fem1d2d.proved import enclose_largest
-from verification.threads import one_thread
+from fem1d2d.proofs.enclosed import Enclosed
+from fem1d2d.proofs.loewner import Elimination, positive_definite
+from fem1d2d.proofs.proved import enclose_largest
+from verification.machine.threads import one_thread
 
 #: The lambda of a pencil: a double, as a bound that is tried is one.
 SHIFTS = (0.5, 1.0, 0.1, 3.7, 1e-3)

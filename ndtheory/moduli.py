@@ -146,8 +146,8 @@ def end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> tupl
     ``d' K^-1 d log(1/e) + O(1)`` on each body.  For every force rho is at least the work on the Neumann body over the
     work on the contact body: as e tends to 0, at least the largest eigenvalue of ``(K_c, K_n)``.  Meshes approach the
     values like ``1/log^2 h``, from inside.  In space an end is an edge, and forces along it add
-    ``(G_c alpha_c)/(G_n alpha_n)``.  In the plane :func:`ndtheory.wedges.end_bound` uses every power of r, of which a
-    force at the apex is a limit, and may find a larger ratio; ``docs/continuum.md`` has the proof of both.
+    ``(G_c alpha_c)/(G_n alpha_n)``.  In the plane :func:`ndtheory.continuum.wedges.end_bound` uses every power of r, of
+    which a force at the apex is a limit, and may find a larger ratio; ``docs/continuum.md`` has the proof of both.
 
     Parameters
     ----------
@@ -211,10 +211,10 @@ def layer(body: Moduli) -> float:
     """The largest ratio of stiffnesses of a layer's mirror image and of the layer, for every thickness.
 
     The layer is infinitely long and held along its other side.  At x = (wave number times thickness) its surface has
-    the stiffnesses of :func:`ndtheory.strip.symbols`, and its mirror image the same with NT of opposite sign: the ratio
-    is ``(1 + q)/(1 - q)`` with ``q = |NT|/sqrt(TT NN)``.  Short waves have kappa, like a half-plane; in a nearly
-    incompressible layer long ones have more.  The maximum is sought among waves a hundredth apart in log10 x, and is
-    good to three figures.
+    the stiffnesses of :func:`ndtheory.continuum.strip.symbols`, and its mirror image the same with NT of opposite sign:
+    the ratio is ``(1 + q)/(1 - q)`` with ``q = |NT|/sqrt(TT NN)``.  Short waves have kappa, like a half-plane; in a
+    nearly incompressible layer long ones have more.  The maximum is sought among waves a hundredth apart in log10 x,
+    and is good to three figures.
 
     Examples
     --------

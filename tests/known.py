@@ -10,9 +10,9 @@ from shared import Shared
 from verification import comparison
 from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
-from verification.bounds import lipschitz, multipliers
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
+from verification.semidefinite import lipschitz, multipliers
 
 #: Most of the time of a comparison goes into these: module and name.
 DEAR = [(comparison, "locate"), (multipliers, "friction_threshold"), (lipschitz, "work_out")]

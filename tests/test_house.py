@@ -14,12 +14,12 @@ ROOMS = ("fem1d2d", "ndtheory", "verification")
 
 #: module: the modules and packages that alone may import it
 DOORS = {
-    "cvxpy": ("verification.contact.model", "verification.bounds.model"),
+    "cvxpy": ("verification.contact.model", "verification.semidefinite.model"),
     "matplotlib": ("verification.figures", "verification.document"),
     "click": ("verification.cli",),
     "rich": ("verification.cli",),
     "hypothesis": ("verification.testing",),
-    "flint": ("verification.certificate", "fem1d2d.layers_proved"),
+    "flint": ("verification.certificate", "fem1d2d.proofs.layers_proved"),
     "sqlite3": ("verification.sweeps.store",),
     "distributed": ("verification.sweeps.cluster",),
     "xarray": ("verification.sweeps.export",),
@@ -116,7 +116,7 @@ def test_a_forbidden_edge_is_found(module, source):
         ("verification", "importlib.import_module(f'verification.{home}')"),
         ("verification.compare", "import ndtheory, fem1d2d, numpy"),
         ("verification.contact.model", "import cvxpy"),
-        ("verification.bounds.model", "def f():\n    import cvxpy"),
+        ("verification.semidefinite.model", "def f():\n    import cvxpy"),
         ("verification.figures.region", "import matplotlib"),
         ("verification.figures", "import matplotlib"),
         ("verification.testing.rules", "from hypothesis import strategies"),

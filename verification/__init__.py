@@ -24,14 +24,12 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from typing import Any
 
-    from verification.advice.from_logs import advise_logs as advise_logs
-    from verification.advice.from_matrices import advise_matrices as advise_matrices
-    from verification.advice.from_moduli import advise_moduli as advise_moduli
-    from verification.advice.from_runs import advise_run as advise_run
-    from verification.advice.from_vectors import advise_vectors as advise_vectors
-    from verification.advice.roles import Advice as Advice
-    from verification.advice.roles import advise as advise
+    from verification.algorithm.history import History as History
+    from verification.algorithm.history import march as march
     from verification.algorithm.iterate import Iterate as Iterate
+    from verification.algorithm.monolithic import Solution as Solution
+    from verification.algorithm.monolithic import SolveError as SolveError
+    from verification.algorithm.monolithic import solve as solve
     from verification.algorithm.relaxation import Rule as Rule
     from verification.algorithm.runs import Run as Run
     from verification.algorithm.runs import run as run
@@ -43,20 +41,22 @@ if TYPE_CHECKING:
     from verification.constants.measured import Measured as Measured
     from verification.constants.measuring import measure as measure
     from verification.contact import ContactError as ContactError
-    from verification.coupling import Coupling as Coupling
-    from verification.coupling import couple as couple
+    from verification.coupling.driver import Coupling as Coupling
+    from verification.coupling.driver import couple as couple
+    from verification.coupling.from_logs import advise_logs as advise_logs
+    from verification.coupling.from_matrices import advise_matrices as advise_matrices
+    from verification.coupling.from_moduli import advise_moduli as advise_moduli
+    from verification.coupling.from_runs import advise_run as advise_run
+    from verification.coupling.from_vectors import advise_vectors as advise_vectors
+    from verification.coupling.roles import Advice as Advice
+    from verification.coupling.roles import advise as advise
     from verification.exploration.page import Exploration as Exploration
     from verification.exploration.page import explore as explore
-    from verification.history import History as History
-    from verification.history import march as march
     from verification.interface.build import build as build
     from verification.interface.interface import Law as Law
     from verification.interface.pair import ContactPair as ContactPair
     from verification.ledger import Ledger as Ledger
     from verification.ledger import verify as verify
-    from verification.monolithic import Solution as Solution
-    from verification.monolithic import SolveError as SolveError
-    from verification.monolithic import solve as solve
     from verification.problem.examples import example as example
     from verification.problem.files import load as load
     from verification.problem.specification import Problem as Problem
@@ -67,13 +67,13 @@ if TYPE_CHECKING:
 
 #: The module of each public name.  No module at this level has the name of a public function: it would hide it.
 _HOME = {
-    "Advice": "advice.roles",
+    "Advice": "coupling.roles",
     "Comparison": "comparison",
     "ContactError": "contact",
     "ContactPair": "interface.pair",
-    "Coupling": "coupling",
+    "Coupling": "coupling.driver",
     "Exploration": "exploration.page",
-    "History": "history",
+    "History": "algorithm.history",
     "Law": "interface.interface",
     "Ledger": "ledger",
     "Measured": "constants.measured",
@@ -81,30 +81,30 @@ _HOME = {
     "ProblemError": "problem.tables",
     "Rule": "algorithm.relaxation",
     "Run": "algorithm.runs",
-    "Solution": "monolithic",
-    "SolveError": "monolithic",
+    "Solution": "algorithm.monolithic",
+    "SolveError": "algorithm.monolithic",
     "Sweep": "sweeps.sweep",
     "Iterate": "algorithm.iterate",
-    "advise": "advice.roles",
-    "advise_logs": "advice.from_logs",
-    "advise_matrices": "advice.from_matrices",
-    "advise_moduli": "advice.from_moduli",
-    "advise_run": "advice.from_runs",
-    "advise_vectors": "advice.from_vectors",
+    "advise": "coupling.roles",
+    "advise_logs": "coupling.from_logs",
+    "advise_matrices": "coupling.from_matrices",
+    "advise_moduli": "coupling.from_moduli",
+    "advise_run": "coupling.from_runs",
+    "advise_vectors": "coupling.from_vectors",
     "build": "interface.build",
     "certify": "certificate.contraction",
     "check_again": "certificate.contraction",
     "compare": "comparison",
-    "couple": "coupling",
+    "couple": "coupling.driver",
     "example": "problem.examples",
     "explore": "exploration.page",
     "iterate": "algorithm.start",
     "load": "problem.files",
-    "march": "history",
+    "march": "algorithm.history",
     "measure": "constants.measuring",
     "run": "algorithm.runs",
     "schema": "schemas",
-    "solve": "monolithic",
+    "solve": "algorithm.monolithic",
     "sweep": "sweeps.sweep",
     "verify": "ledger",
 }

@@ -16,17 +16,17 @@ from verification.algorithm.runs import Run, check_memory, run
 from verification.algorithm.theta import Choice, begin
 from verification.bounds import LARGEST
 from verification.bounds.bound import NOT_ASKED, BoundResult, Subject
-from verification.bounds.losses import Losses, locate
 from verification.bounds.table import BOUNDS, chosen, named
+from verification.bounds.verdicts import Judgement, judge_bound, judge_forecast
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
 from verification.document import Document
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
-from verification.interrupts import INTERRUPTED
+from verification.machine.interrupts import INTERRUPTED
+from verification.machine.progress import Progress, silent
 from verification.problem import Problem
-from verification.progress import Progress, silent
-from verification.verdicts import Judgement, judge_bound, judge_forecast
+from verification.semidefinite.losses import Losses, locate
 
 T = TypeVar("T")
 

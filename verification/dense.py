@@ -11,7 +11,7 @@ from scipy.linalg.blas import dsymv, dtrsv
 from scipy.linalg.lapack import dpocon, dpotrf, dpotrs
 
 from fem1d2d.mesh import Floats, Ints
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
 
 #: A component of an orthonormal rigid motion below this is 0.
 STILL = 1e-9

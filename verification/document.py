@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import __version__
-from verification.sections.layout import text
-from verification.sections.parts import Section
+from verification.show.layout import text
+from verification.show.parts import Section
 from verification.value import Value
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Document(Value, ABC):
         one place has that in ``only``.  There are none where only the document is shown, as for matrices without a
         problem.
         """
-        found: tuple[Section, ...] = importlib.import_module("verification.sections.of_results").of(self)
+        found: tuple[Section, ...] = importlib.import_module("verification.show.of_results").of(self)
         return found
 
     def _repr_html_(self) -> str:

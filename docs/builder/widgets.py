@@ -19,9 +19,9 @@ from builder import equations, questions, scenes, stills
 from ndtheory import bounds, energy_norms
 from ndtheory.scalar import maximum, minimum
 from ndtheory.statements import Statement, proof_of, statements
-from verification.bounds import losses
 from verification.exploration.javascript import function
 from verification.figures import proof_map, style
+from verification.semidefinite import losses
 
 
 def section5_constants(
@@ -52,8 +52,8 @@ FORMULAS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
     "lossQuotients": (losses.quotients, ("m", "M", "CR", *losses.Suprema.__annotations__)),
 }
 
-#: How the largest values of :class:`verification.bounds.losses.Suprema` grow: the powers of the moduli of the contact
-#: body and of the Neumann body.
+#: How the largest values of :class:`verification.semidefinite.losses.Suprema` grow: the powers of the moduli of the
+#: contact body and of the Neumann body.
 POWERS = {
     "reaction": (2, 0),
     "energy": (1, -1),

@@ -17,11 +17,11 @@ from matplotlib.figure import Figure
 
 import verification as vf
 from ndtheory.number import directed
-from verification.bounds.region import chart
 from verification.certificate.continuum import certify_continuum
 from verification.constants.cells import halved_cells, rho_of_cells
 from verification.figures import draw_region, draw_waterfall, save
 from verification.figures.style import BODIES, new_figure, styled
+from verification.sweeps.region import chart
 
 Numbers = dict[str, Any]
 

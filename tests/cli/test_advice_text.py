@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from strategies import contact_problems
 
 import verification as vf
-from verification.advice.roles import steps
 from verification.cli.problems import examples
-from verification.sections.layout import text
+from verification.coupling.roles import steps
+from verification.show.layout import text
 
 FORMS = {
     "section 6": [],

@@ -34,7 +34,7 @@ CALLS = {
 
 
 def test_a_pattern_with_repeats_inside_repeats_is_refused_after_some_time(call, tmp_path, monkeypatch):
-    monkeypatch.setattr("verification.advice.log_files.SECONDS", 1)
+    monkeypatch.setattr("verification.coupling.log_files.SECONDS", 1)
     log = tmp_path / "solver.out"
     log.write_text("a" * 80 + "\n", "utf-8")
     complaint = call("advise", "run", "--log", log, "--theta", "0.5", "--pattern", "(?:a+)+b (.*)").complaint

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from advice_calls import GOOD, by_body, saved
 
 import verification as vf
-from verification.advice.matrix_files import read_matrix
+from verification.coupling.matrix_files import read_matrix
 from verification.interface.pair import pair_from
 
 

@@ -7,7 +7,7 @@ import pytest
 from advice_calls import ROLE, pasted
 from complaints import assert_names
 
-from verification.advice.roles import TIED
+from verification.coupling.roles import TIED
 
 GIVEN = ("--young", "7e4,2e4", "--poisson", "0.3,0.3")
 SHAPES = [

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from complaints import assert_names
 
 from fem1d2d import rectangle
-from verification.advice.matrix_files import read_matrix
+from verification.coupling.matrix_files import read_matrix
 
 # --- files without an end ---
 

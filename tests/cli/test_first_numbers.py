@@ -10,9 +10,9 @@ from processes import SKETCHED, ended, on_a_terminal
 
 import verification as vf
 from verification import comparison
-from verification.bounds import lipschitz
 from verification.cli import main
 from verification.contact import ContactError
+from verification.semidefinite import lipschitz
 
 #: Says on the same stdout when something slow begins, unbuffered: the order of its lines is what a reader sees.  The
 #: process ends where figures begin, so that what was not written by then is never written.
@@ -33,7 +33,7 @@ MARKED = """
 
     sys.meta_path.insert(0, Imports())
     from verification import comparison
-    from verification.bounds import lipschitz
+    from verification.semidefinite import lipschitz
     from verification.cli import main
 
     def marked(module, name):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import verification as vf
-from verification.advice.log_files import read_log
+from verification.coupling.log_files import read_log
 from verification.output.inputs import INPUTS
 
 ROOT = Path(__file__).parents[2]

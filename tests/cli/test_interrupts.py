@@ -323,7 +323,7 @@ def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
 
 
 def test_region_draws_the_runs_that_were_made(call, quick, write, tmp_path, monkeypatch):
-    from verification.bounds import region as plane
+    from verification.sweeps import region as plane
     from verification.sweeps import workers
 
     monkeypatch.setattr(plane, "THETAS", (0.2, 0.4))

@@ -10,7 +10,7 @@ import pytest
 from histories import PATH, pressed_and_sheared
 
 import verification as vf
-from verification import history
+from verification.algorithm import history
 from verification.output import files
 
 

@@ -10,12 +10,13 @@ from email.message import Message
 import pytest
 
 import verification
-from verification import comparison, figures, verdicts
+from verification import comparison, figures
+from verification.algorithm.monolithic import SolveError
+from verification.bounds import verdicts
+from verification.bounds.verdicts import Judgement
 from verification.cli.problems import examples
 from verification.contact import ContactError
-from verification.monolithic import SolveError
-from verification.sections.comparison import NAMES, WORDS
-from verification.verdicts import Judgement
+from verification.show.comparison import NAMES, WORDS
 
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
 

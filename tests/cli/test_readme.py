@@ -63,7 +63,7 @@ def test_the_readme_names_pages_and_pictures_that_exist() -> None:
 
 def test_the_numbers_that_the_readme_explains_are_those_of_section_6() -> None:
     import verification as vf
-    from verification.advice.roles import steps
+    from verification.coupling.roles import steps
 
     advice = vf.advise(vf.example("section6"))
     lower, upper = advice.roles
@@ -77,7 +77,7 @@ def test_the_numbers_that_the_readme_explains_are_those_of_section_6() -> None:
 
 def test_the_readme_has_a_formula_for_bodies_that_touch_and_one_for_tied_ones_and_what_each_takes() -> None:
     from ndtheory.energy_norms import predicted_theta, tied_factor, tied_theta
-    from verification.advice.roles import steps
+    from verification.coupling.roles import steps
 
     low, high = 2.78, 36.0
     tied, touching = (steps(tied_factor(theta, low, high)) for theta in (tied_theta(low, high), predicted_theta(high)))

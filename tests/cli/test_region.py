@@ -13,11 +13,11 @@ from strategies import AT_NIGHT
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
 from verification.bounds import bound as base
-from verification.bounds import region as plane
 from verification.bounds.bound import NotComputed, Subject
-from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS, SemidefiniteBound
 from verification.cli.problems import examples
+from verification.semidefinite.multipliers import QuadraticForms
+from verification.sweeps import region as plane
 from verification.sweeps import workers
 
 #: A mesh of 20 nodes, the roles such that runs converge, stall and run away.

@@ -6,9 +6,9 @@ from fractions import Fraction as F
 import pytest
 
 from ndtheory import Number
+from verification.certificate.exact_bodies import NotExact
 from verification.constants.measured import ENERGY_NAMES, NAMES
-from verification.interface.exact_bodies import NotExact
-from verification.sections.numbers import between
+from verification.show.numbers import between
 
 
 def test_the_screen_shows_ends_that_lie_outside_those_of_the_document(call, write):

@@ -11,8 +11,8 @@ import pytest
 from coupling_logs import linear_run, precice
 
 import verification as vf
-from verification.advice.snippets import SNIPPETS
 from verification.cli import main
+from verification.coupling.snippets import SNIPPETS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "coupling.md").read_text("utf-8")

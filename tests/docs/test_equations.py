@@ -36,7 +36,7 @@ def test_a_number_leads_to_its_code_its_tests_and_its_pages(entries):
 
 def test_a_number_between_quotation_marks_counts_in_tables_of_checks_alone(equations):
     statement = statements()["2.2"]
-    texts = [("verification.advice.roles", 'young = "2.2"'), ("verification.ledger.solutions", 'CHECKS = {"2.2": f}')]
+    texts = [("verification.coupling.roles", 'young = "2.2"'), ("verification.ledger.solutions", 'CHECKS = {"2.2": f}')]
     assert equations.places(statement, texts) == ["verification.ledger.solutions"]
     assert equations.places(statement, [("verification.x", "Hooke's law (2.2)"), ("y", "(2.20), 2.2")]) == [
         "verification.x"

@@ -21,11 +21,11 @@ from made_up import Halfway
 
 import verification as vf
 from verification import figures, schemas
-from verification.bounds import region as plane
 from verification.bounds.table import BOUNDS
 from verification.certificate.continuum import certify_continuum
 from verification.cli import main
 from verification.reproduce import READINGS, reproduce
+from verification.sweeps import region as plane
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text("utf-8")
 

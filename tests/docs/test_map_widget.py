@@ -9,8 +9,8 @@ from widget_page import frame, move, rows, says
 
 import verification as vf
 from ndtheory.statements import statements
-from verification.bounds.losses import locate
 from verification.figures.proof_map import PRINTED, STEPS
+from verification.semidefinite.losses import locate
 
 MAPS = ("map", "chain")
 NEAR = 1e-9

@@ -11,9 +11,10 @@ from flint import arb_mat, ctx
 from scipy.linalg import eigh
 from strategies import AT_NIGHT
 
-from fem1d2d import MeshError, layers_proved, mortar, plane_strain, rectangle, stiffness
+from fem1d2d import MeshError, mortar, plane_strain, rectangle, stiffness
 from fem1d2d.layers import Interface, Layer, peaks
-from fem1d2d.layers_proved import BITS, HalfPlane, Unproved, enclosed_ratio
+from fem1d2d.proofs import layers_proved
+from fem1d2d.proofs.layers_proved import BITS, HalfPlane, Unproved, enclosed_ratio
 
 STEEL = plane_strain(2.6, 0.3)  # G = 1
 

@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from fem1d2d import plane_strain, rectangle, stiffness
 from ndtheory import HypothesisError, evaluate_energy
 from ndtheory.constants import EnergyConstants
-from ndtheory.continuum import (
+from ndtheory.continuum.intervals import Interval, sinc
+from ndtheory.continuum.rectangles import (
     Rectangle,
     TwoRectangles,
     continuum_constants,
@@ -26,10 +27,9 @@ from ndtheory.continuum import (
     friction_threshold,
     statement,
 )
-from ndtheory.intervals import Interval, sinc
+from ndtheory.continuum.segments import Zone, bound, bound_at_end, meeting, zones
+from ndtheory.continuum.strip import Strip, largest_ratio_of_strips, largest_smoothed, symbols
 from ndtheory.moduli import Moduli, half_planes, mirror
-from ndtheory.segments import Zone, bound, bound_at_end, meeting, zones
-from ndtheory.strip import Strip, largest_ratio_of_strips, largest_smoothed, symbols
 
 HARD, SOFT = Moduli(young=70000, poisson="0.3"), Moduli(young=20000, poisson="0.3")
 THICK = F(3, 10)

@@ -14,8 +14,8 @@ from strategies import fewer
 
 from fem1d2d import Condensation, plane_strain, sector, stiffness
 from ndtheory import HypothesisError
+from ndtheory.continuum.wedges import Wedge, end_bound, ratio
 from ndtheory.moduli import Moduli, end, free_end, half_planes
-from ndtheory.wedges import Wedge, end_bound, ratio
 
 bodies = st.builds(Moduli, young=st.integers(1, 1000), poisson=st.fractions("-0.9", "0.48", max_denominator=50))
 openings = st.integers(15, 345)

@@ -30,11 +30,17 @@ MISSION: dict[str, tuple[str, ...]] = {
         "verification/algorithm/rates": "safeguards/rates_safe verification/rates",
         "verification/algorithm/relaxation": "verification/relaxation verification/conformance",
         "verification/algorithm/runs": "verification/iteration verification/results verification/held_by_contact",
-        "verification/bounds/conditions": "safeguards/multipliers_safe verification/lifted verification/exact",
-        "verification/bounds/interior_point": "verification/interior_point verification/exact",
-        "verification/bounds/lipschitz": "verification/mirror verification/exact verification/verified_comparison",
-        "verification/bounds/multipliers": "safeguards/multipliers_safe verification/multipliers verification/exact",
-        "verification/bounds/trace_forms": "verification/rounding_of_forms verification/rounding_of_forms_in_friction",
+        "verification/semidefinite/conditions": "safeguards/multipliers_safe verification/lifted verification/exact",
+        "verification/semidefinite/interior_point": "verification/interior_point verification/exact",
+        "verification/semidefinite/lipschitz": (
+            "verification/mirror verification/exact verification/verified_comparison"
+        ),
+        "verification/semidefinite/multipliers": (
+            "safeguards/multipliers_safe verification/multipliers verification/exact"
+        ),
+        "verification/semidefinite/trace_forms": (
+            "verification/rounding_of_forms verification/rounding_of_forms_in_friction"
+        ),
         "verification/comparison": "verification/compare_bounds verification/verdicts cli/first_numbers",
         "verification/constants/measuring": "verification/constants verification/energy_constants",
         "verification/constants/operators": "verification/operators",
@@ -47,8 +53,8 @@ MISSION: dict[str, tuple[str, ...]] = {
         "verification/interface/interface": "verification/build verification/grids verification/conformance",
         "verification/interface/joining": "safeguards/joining verification/drawn_geometry verification/lines",
         "verification/interface/pair": "verification/build verification/relaxation verification/constants",
-        "verification/monolithic": "verification/global verification/checks verification/drawn_geometry",
-        "verification/verdicts": "verification/verdicts verification/verified_comparison",
+        "verification/algorithm/monolithic": "verification/global verification/checks verification/drawn_geometry",
+        "verification/bounds/verdicts": "verification/verdicts verification/verified_comparison",
     }.items()
 }
 
@@ -66,7 +72,7 @@ EQUIVALENT: dict[str, dict[str, str]] = {
     "verification/algorithm/ending.py": {
         "Ending.__init__: 0 -> 1": "the first residual is below infinity, which sets the count to 0"
     },
-    "verification/bounds/lipschitz.py": {
+    "verification/semidefinite/lipschitz.py": {
         "_division: free & (pieces.slip == 0) -> free": "the slip of a node is fixed only once its sign is"
     },
     "verification/contact/active_set.py": {

@@ -35,17 +35,17 @@ class Mutant:
 
 #: The tests that have to fail, by module.
 TESTS: dict[str, tuple[str, ...]] = {
-    "fem1d2d/enclosed.py": ("tests/safeguards/test_enclosed.py",),
-    "fem1d2d/loewner.py": ("tests/safeguards/test_loewner.py",),
+    "fem1d2d/proofs/enclosed.py": ("tests/safeguards/test_enclosed.py",),
+    "fem1d2d/proofs/loewner.py": ("tests/safeguards/test_loewner.py",),
     "ndtheory/energy_norms.py": ("tests/safeguards/test_energy_safe.py",),
-    "verification/advice/from_logs.py": (
+    "verification/coupling/from_logs.py": (
         "tests/verification/test_from_logs.py",
         "tests/verification/test_runs_with_friction.py",
         "tests/verification/test_next_run.py",
     ),
     "verification/algorithm/rates.py": ("tests/safeguards/test_rates_safe.py",),
-    "verification/bounds/conditions.py": ("tests/safeguards/test_multipliers_safe.py",),
-    "verification/bounds/multipliers.py": ("tests/safeguards/test_multipliers_safe.py",),
+    "verification/semidefinite/conditions.py": ("tests/safeguards/test_multipliers_safe.py",),
+    "verification/semidefinite/multipliers.py": ("tests/safeguards/test_multipliers_safe.py",),
     "verification/contact/kkt.py": ("tests/safeguards/test_kkt.py",),
     "verification/dense.py": ("tests/safeguards/test_kkt.py",),
     "verification/interface/joining.py": ("tests/safeguards/test_joining.py",),
@@ -61,7 +61,7 @@ TRIANGLE = (
 )
 
 MUTANTS: dict[str, list[tuple[str, ...]]] = {
-    "fem1d2d/enclosed.py": [
+    "fem1d2d/proofs/enclosed.py": [
         ("/ (1 - n * UNIT) * (1 + 4 * UNIT)", "/ (1 - n * UNIT)"),
         ("/ (1 - n * UNIT) * (1 + 4 * UNIT)", "* (1 + 4 * UNIT)"),
         ("x * (1 + 2 * gamma(n + 2)) + TINY", "x + TINY"),
@@ -83,7 +83,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("if not ((sizes <= LARGEST) & ((sizes >= SMALLEST) | (exact == 0))).all():", "if False:"),
         ("upwards(np.asarray(matrix.sum(axis=1)).ravel(), terms)", "np.asarray(matrix.sum(axis=1)).ravel()"),
     ],
-    "fem1d2d/loewner.py": [
+    "fem1d2d/proofs/loewner.py": [
         ("gamma(terms + 3) * products", "gamma(1) * products"),
         ("upwards(sizes.T @ np.ones(n), n)", "sizes.T @ np.ones(n)", SPARE),
         ("upwards(sizes @ (pivots * columns), terms + 2)", "sizes @ (pivots * columns)", SPARE),
@@ -173,7 +173,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ),
         ("for corner in constants.corners or ()", "for corner in ()"),
     ],
-    "verification/advice/from_logs.py": [
+    "verification/coupling/from_logs.py": [
         ("abs(log.theta - float(theta)) > off * (1 + 1e-9)", "False"),
         ("if not bare.converges and all(reading.kind", "if False and all(reading.kind"),
         ("ratio is not None and grows:", "False:"),
@@ -239,12 +239,12 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("(after + error_after) / (before - error_before)", "(after + error_after) / before"),
         ("float(lo[most]), 0.0)", "float(lo[most]), -1.0)"),
     ],
-    "verification/bounds/conditions.py": [
+    "verification/semidefinite/conditions.py": [
         ("np.maximum(y, 0.0)", "y"),
         ("np.minimum(tau, 2 * np.sqrt(a * b) * (1 - 1e-12))", "tau"),
         ("2 * np.sqrt(a * b) * (1 - 1e-12)", "2 * np.sqrt(a * b)"),
     ],
-    "verification/bounds/multipliers.py": [
+    "verification/semidefinite/multipliers.py": [
         ("math.nextafter(root(found.value), math.inf)", "root(found.value)"),
         ("if left > 0:", "if left > -1e-3:"),
         ("return -1.0", "return 1.0"),

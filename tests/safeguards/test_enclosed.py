@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fem1d2d.enclosed import LARGEST, SMALLEST, UNIT, Enclosed, gamma, nearest, total, upwards
+from fem1d2d.proofs.enclosed import LARGEST, SMALLEST, UNIT, Enclosed, gamma, nearest, total, upwards
 
 F = np.vectorize(Fraction, otypes=[object])
 

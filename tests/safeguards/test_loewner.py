@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fem1d2d.enclosed import UNIT, Enclosed
-from fem1d2d.loewner import Elimination, positive_definite
+from fem1d2d.proofs.enclosed import UNIT, Enclosed
+from fem1d2d.proofs.loewner import Elimination, positive_definite
 
 F = np.vectorize(Fraction, otypes=[object])
 LAST = np.array([-1])

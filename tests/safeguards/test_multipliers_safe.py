@@ -9,9 +9,9 @@ import pytest
 from problem_list import blocks, small
 
 import verification as vf
-from verification.bounds import interior_point
-from verification.bounds.interior_point import LMIError
-from verification.bounds.multipliers import NARROW, QuadraticForms, friction_threshold
+from verification.semidefinite import interior_point
+from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite.multipliers import NARROW, QuadraticForms, friction_threshold
 
 THETAS = np.linspace(0.1, 0.9, 9)
 

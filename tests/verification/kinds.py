@@ -9,7 +9,6 @@ import verification as vf
 from ndtheory import Constants, EnergyConstants
 from ndtheory.statements import statements
 from verification.bounds.bound import Region, Subject
-from verification.bounds.region import Plane, Point
 from verification.bounds.table import BOUNDS, Calculated
 from verification.certificate.continuum import certify_continuum
 from verification.ledger.evidence import Evidence
@@ -17,6 +16,7 @@ from verification.ledger.record import recorded
 from verification.ledger.rows import Row
 from verification.reproduce import reproduce
 from verification.sweeps.grid import SweepGrid
+from verification.sweeps.region import Plane, Point
 from verification.sweeps.store import plan
 
 

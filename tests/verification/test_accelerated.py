@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ndtheory import HypothesisError
-from verification.advice.accelerated import seen_accelerated
-from verification.advice.from_logs import advise_logs
-from verification.advice.log_files import read_log
-from verification.advice.log_lines import PatternError, form_of_pattern
+from verification.coupling.accelerated import seen_accelerated
+from verification.coupling.from_logs import advise_logs
+from verification.coupling.log_files import read_log
+from verification.coupling.log_lines import PatternError, form_of_pattern
 from verification.problem.tables import ProblemError
 
 MODES = (0.2, 0.5, 1.1, 3.0)

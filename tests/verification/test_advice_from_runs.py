@@ -12,10 +12,10 @@ from problem_list import changed
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.advice.from_runs import advise_run
-from verification.advice.readings import same_run
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.relaxation import Constant
+from verification.coupling.from_runs import advise_run
+from verification.coupling.readings import same_run
 from verification.interface.pair import pair_from
 
 #: A residual fallen to this share of its largest has converged.

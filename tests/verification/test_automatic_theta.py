@@ -11,10 +11,10 @@ from problem_list import changed
 
 import verification as vf
 from ndtheory import EnergyConstants, evaluate_energy
-from verification.advice.from_matrices import advise_matrices
 from verification.algorithm.relaxation import RULES, Constant
 from verification.algorithm.theta import automatic, choose, energy_bounds
 from verification.cli.problems import examples, load_problem
+from verification.coupling.from_matrices import advise_matrices
 from verification.interface.pair import pair_from
 from verification.problem import ProblemError
 

@@ -5,12 +5,12 @@ import pytest
 
 import verification as vf
 from ndtheory import evaluate_energy
-from verification.advice.best_theta import Fewest, best_theta
 from verification.bounds.bound import Subject
-from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
 from verification.figures.best_theta import Panel, draw_best_theta
 from verification.figures.sweep import draw_rules
+from verification.semidefinite.multipliers import QuadraticForms
+from verification.sweeps.best_theta import Fewest, best_theta
 
 SMALL = vf.example("section6-60").changed(max_iterations=400)
 

@@ -13,12 +13,12 @@ from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.rates import largest_step_ratio
 from verification.algorithm.theta import energy_bounds
-from verification.bounds.multipliers import QuadraticForms
 from verification.constants import measure
 from verification.interface.build import build
 from verification.interface.friction import Nonlocal, hat
 from verification.interface.interface import Law
 from verification.interface.pair import ContactPair
+from verification.semidefinite.multipliers import QuadraticForms
 
 
 def as_matrices(pair: ContactPair) -> dict[str, object]:

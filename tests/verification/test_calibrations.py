@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 import verification as vf
 from fem1d2d import plane_strain, rectangle, stiffness
 from ndtheory import HypothesisError
-from ndtheory.calibration import loss
-from ndtheory.continuum import continuum_constants, friction_threshold, statement
-from ndtheory.intervals import Interval
+from ndtheory.continuum.calibration import loss
+from ndtheory.continuum.intervals import Interval
+from ndtheory.continuum.rectangles import continuum_constants, friction_threshold, statement
 from verification.certificate import calibrating, continuum
 from verification.certificate.continuum import bounded, two_rectangles
 

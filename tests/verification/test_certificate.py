@@ -17,13 +17,13 @@ from processes import environment
 
 import verification as vf
 from verification.bounds.bound import Subject
-from verification.bounds.lipschitz import enclose
-from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
 from verification.certificate import check, claims
 from verification.certificate.claims import FEWEST, LEFT, Claims, NoCertificate, describe
 from verification.certificate.contraction import certify, check_again
-from verification.progress import silent
+from verification.machine.progress import silent
+from verification.semidefinite.lipschitz import enclose
+from verification.semidefinite.multipliers import QuadraticForms
 
 GRIDS_DIFFER = changed(small(), body2={"cells": [5, 2]})
 PROBLEMS = {

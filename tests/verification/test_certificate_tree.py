@@ -15,11 +15,11 @@ from problem_list import blocks, changed, small
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.bounds import lipschitz
 from verification.certificate import check
 from verification.certificate.claims import NoCertificate
 from verification.certificate.contraction import check_again
 from verification.ledger.cases import problem as random_problem
+from verification.semidefinite import lipschitz
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 RUBBING = blocks(cells=[[1, 1], [1, 1]], contact={"friction": "1/2", "radius": "0.6"}, iteration={"theta": "0.3"})

@@ -19,11 +19,11 @@ from hypothesis import settings
 from ndtheory import REPAIRED, bounds, energy_norms, evaluate
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import largest_step_ratio
-from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.pattern_search import largest_factor
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
+from verification.semidefinite.multipliers import QuadraticForms
+from verification.semidefinite.pattern_search import largest_factor
 
 #: Random problems, the same ones each time, and the batches that they are tried in: each costs a semidefinite program
 #: and a search.

@@ -13,10 +13,10 @@ from ndtheory import Number
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.relaxation import RULES, Momentum, Rule, momentum_rate
 from verification.bounds.bound import Subject
-from verification.bounds.pattern_search import largest_factor
 from verification.bounds.table import BOUNDS, Energy
 from verification.interface.friction import LAWS, Local, Nonlocal, hat
 from verification.interface.interface import Law
+from verification.semidefinite.pattern_search import largest_factor
 from verification.testing import (
     Refused,
     check_bound,

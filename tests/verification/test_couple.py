@@ -10,7 +10,7 @@ from linear_couplings import Linear
 import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.relaxation import Rule
-from verification.coupling import CouplingError
+from verification.coupling.driver import CouplingError
 
 
 def bars():

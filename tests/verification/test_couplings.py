@@ -12,7 +12,7 @@ import pytest
 from coupling_logs import linear_run, noisy, precice
 
 import verification as vf
-from verification.advice.ends import Box, cheapest, common, dearest, of_ratio
+from verification.coupling.ends import Box, cheapest, common, dearest, of_ratio
 from verification.problem.tables import ProblemError
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"

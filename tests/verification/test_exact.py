@@ -10,11 +10,11 @@ from problem_list import blocks
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.bounds import interior_point
-from verification.bounds.conditions import Pieces
-from verification.bounds.interior_point import LMIError, Stop
-from verification.bounds.lipschitz import Leaf, budget, enclose
-from verification.bounds.multipliers import QuadraticForms
+from verification.semidefinite import interior_point
+from verification.semidefinite.conditions import Pieces
+from verification.semidefinite.interior_point import LMIError, Stop
+from verification.semidefinite.lipschitz import Leaf, budget, enclose
+from verification.semidefinite.multipliers import QuadraticForms
 
 THETA = 0.7
 

@@ -21,7 +21,7 @@ from ndtheory.energy_norms import one_minus_square, predicted_factor
 from verification.contact import ContactError
 from verification.exploration import page
 from verification.exploration.film import STATES, film, packed, steps_shown
-from verification.progress import silent
+from verification.machine.progress import silent
 
 #: A page of a problem with 25 contact nodes weighs at most so many bytes.
 LARGEST = 1_500_000

@@ -13,11 +13,11 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification.bounds.bound import Region
-from verification.bounds.region import Plane, Point
 from verification.bounds.table import BOUNDS
 from verification.cli.problems import examples
 from verification.figures import draw_bodies, draw_residuals, save
 from verification.figures.style import OUTCOMES, RAISED, new_figure
+from verification.sweeps.region import Plane, Point
 
 LOWERED = {raised: plain for plain, raised in RAISED.items()}
 

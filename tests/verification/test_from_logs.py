@@ -11,12 +11,12 @@ from coupling_logs import linear_run, precice
 
 import verification as vf
 from ndtheory import HypothesisError
-from verification.advice import from_logs
-from verification.advice.ends import SWIFT, Box
-from verification.advice.log_files import Column, Log
-from verification.advice.pace import Pace
-from verification.advice.readings import NextRun, Observed, read_observed, read_plateau
-from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog, seen_column
+from verification.coupling import from_logs
+from verification.coupling.ends import SWIFT, Box
+from verification.coupling.log_files import Column, Log
+from verification.coupling.pace import Pace
+from verification.coupling.readings import NextRun, Observed, read_observed, read_plateau
+from verification.coupling.seen import LogBound, RhoInterval, SeenColumn, SeenLog, seen_column
 from verification.problem.tables import ProblemError
 
 
@@ -331,7 +331,7 @@ def test_what_logs_leave_together_decides_within_1_4_and_else_names_a_run_below_
 
 def test_rho_is_taken_at_the_upper_end_of_all_that_is_left(monkeypatch):
     left = [Box(a=(1.0, 1.0), b=(1.3, 1.4)), Box(a=(1.0, 1.0), b=(1.1, 1.2))]
-    monkeypatch.setattr("verification.advice.ends.common", lambda each: left)
+    monkeypatch.setattr("verification.coupling.ends.common", lambda each: left)
     falls = log("0.9", "0.2")
     assert float(from_logs.by_ends((falls,), falls, None, True)[2]) == pytest.approx(0.4)
 

@@ -13,8 +13,8 @@ from problem_list import APART, PROBLEMS, bars, plates
 from sample_runs import converged
 
 import verification as vf
+from verification.algorithm.monolithic import ContactSystem, SolveError, contact_system
 from verification.interface.assembly import discretise
-from verification.monolithic import ContactSystem, SolveError, contact_system
 
 REFERENCE = Path(__file__).parent / "reference_local_coulomb.csv"
 

@@ -16,9 +16,9 @@ from problem_list import LOWER, bars, changed
 import verification as vf
 from fem1d2d import condense
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
+from verification.algorithm.history import History
 from verification.algorithm.rates import noise
 from verification.algorithm.start import LEAST, tied_size
-from verification.history import History
 from verification.interface.files import write_interface
 from verification.problem.steps import at_rest, moments
 from verification.testing.strategies import SEEDS, forces, matrix_pairs

@@ -7,9 +7,9 @@ from made_up import Halfway
 
 import verification as vf
 from fem1d2d import stiffness
+from verification.algorithm.history import steps_to
 from verification.algorithm.rates import noise
 from verification.bounds.table import BOUNDS
-from verification.history import steps_to
 from verification.problem.steps import at_rest
 
 

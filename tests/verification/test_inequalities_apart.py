@@ -22,8 +22,8 @@ from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, Reading
 from verification.ledger.solutions import CHECKS
 from verification.ledger.weak_forms import Case, Weak
 from verification.ledger.worst import Trial, draw_cases, pairs_of
+from verification.machine.threads import one_thread
 from verification.problem.specification import Problem
-from verification.threads import one_thread
 
 ENTRY = {inequality.id: inequality for inequality in INEQUALITIES if inequality.of == "printed"}
 

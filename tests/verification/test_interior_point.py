@@ -9,9 +9,9 @@ from chain_problems import case
 from scipy.linalg import block_diag
 
 import verification as vf
-from verification.bounds import interior_point, model
-from verification.bounds.interior_point import LMIError, Optimum, Program, Stop
-from verification.bounds.multipliers import QuadraticForms
+from verification.semidefinite import interior_point, model
+from verification.semidefinite.interior_point import LMIError, Optimum, Program, Stop
+from verification.semidefinite.multipliers import QuadraticForms
 
 SEEDS = list(islice((seed for seed in count() if case(seed)[0].contact.grid.n <= 4), 10))
 

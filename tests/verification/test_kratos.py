@@ -15,11 +15,11 @@ import pytest
 from coupling_logs import contact_run, tied_run
 
 import verification as vf
-from verification.advice.from_logs import advise_logs
-from verification.advice.log_files import read_log
-from verification.advice.methods import METHODS, steps
-from verification.advice.snippets import CouplingScheme, snippet
 from verification.cli import main
+from verification.coupling.from_logs import advise_logs
+from verification.coupling.log_files import read_log
+from verification.coupling.methods import METHODS, steps
+from verification.coupling.snippets import CouplingScheme, snippet
 from verification.problem.specs import SidePart
 
 APPLICATIONS = ("CoSimulation", "StructuralMechanics", "ConstitutiveLaws", "Mapping", "LinearSolvers")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from processes import ended
 
-from verification.coupling import Coupling
+from verification.coupling.driver import Coupling
 from verification.coupling.kratos import LABEL, Accelerator, Create
 
 MODES = np.array([0.2, 0.5, 1.1, 3.0])

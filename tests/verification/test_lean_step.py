@@ -23,7 +23,7 @@ from verification.contact.kkt import KKTCertificate
 from verification.dense import Cholesky, times, worst
 from verification.interface import body
 from verification.interface.body import Condensed
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
 
 EPS = np.finfo(float).eps
 

@@ -31,8 +31,8 @@ from verification.ledger.differences import (
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
 from verification.ledger.worst import Trial, WorstTally, discrete, draw_cases, pairs_of
+from verification.machine.threads import one_thread
 from verification.problem.specification import Problem
-from verification.threads import one_thread
 
 #: What fails as printed, on bodies that are named.
 REFUTED = {("4.7", "printed"), ("5.13", "printed"), ("5.30", "printed")}

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from ndtheory.intervals import Interval
+from ndtheory.continuum.intervals import Interval
 from verification.ledger import enclosures
 from verification.ledger.cases import ENCLOSED
 from verification.ledger.differences import along, uniform_piece

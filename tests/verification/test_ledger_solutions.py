@@ -7,6 +7,7 @@ import pytest
 from ledger_evidence import HOLDS, PRINTED, REPAIRED, STEP, holds
 
 from ndtheory.statements import statements
+from verification.algorithm.monolithic import solution_force, solve
 from verification.interface.pair import pair_from
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
@@ -14,7 +15,6 @@ from verification.ledger.evidence import settle
 from verification.ledger.experiments import Section6, StoppedRuns
 from verification.ledger.sheets import outcome
 from verification.ledger.solutions import solutions
-from verification.monolithic import solution_force, solve
 from verification.problem import Problem
 from verification.reproduce import READINGS
 from verification.reproduce.claims import NODES, zones, zones_hold

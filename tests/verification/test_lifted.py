@@ -10,10 +10,10 @@ import scipy.linalg
 from problem_list import changed, plates
 
 import verification as vf
-from verification.bounds import model
-from verification.bounds.lipschitz import enclose
-from verification.bounds.multipliers import QuadraticForms
 from verification.interface.body import NO_MOTIONS
+from verification.semidefinite import model
+from verification.semidefinite.lipschitz import enclose
+from verification.semidefinite.multipliers import QuadraticForms
 
 LIFTED = plates(
     body2={"prescribed": {"left": [0, "free"]}, "traction": {"top": [0, -3000]}},

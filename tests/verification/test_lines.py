@@ -14,18 +14,18 @@ from two_methods import assert_same
 import verification as vf
 from fem1d2d import element, mesh_files, plane_strain, rectangle
 from fem1d2d.assembly import unknowns
-from fem1d2d.exact import fractions
 from fem1d2d.mesh import Cells
+from fem1d2d.proofs.exact import fractions
 from verification.certificate import check
 from verification.certificate.contraction import check_again
+from verification.certificate.exact_bodies import ExactBody, exact_normals
 from verification.interface.assembly import discretise
-from verification.interface.exact_bodies import ExactBody, exact_normals
 from verification.interface.files import read_interface, write_interface
 from verification.ledger import cases, weak_forms
 from verification.ledger.solutions import solutions
 from verification.problem import ProblemError
-from verification.sections.layout import text
-from verification.sections.of_results import of
+from verification.show.layout import text
+from verification.show.of_results import of
 
 #: Documents of one problem in two positions agree up to this: rounding, and what conditions make of it.
 ROTATED = 1e-9

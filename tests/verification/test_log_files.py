@@ -9,8 +9,8 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory import HypothesisError
-from verification.advice.from_logs import advise_logs
-from verification.advice.log_files import read_log
+from verification.coupling.from_logs import advise_logs
+from verification.coupling.log_files import read_log
 from verification.problem import ProblemError
 
 MODES = (0.2, 0.5, 1.1, 3.0)  # tied; rho = 3

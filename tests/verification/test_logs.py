@@ -11,7 +11,7 @@ from problem_list import changed
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.advice.from_logs import advise_logs
+from verification.coupling.from_logs import advise_logs
 from verification.interface.pair import pair_from
 
 MODES = (0.2, 0.5, 1.1, 3.0)  # tied; rho = 3

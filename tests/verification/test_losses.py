@@ -21,12 +21,12 @@ from scipy.linalg import eigh
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, bounds
 from verification.algorithm.affine_piece import Piece
-from verification.bounds.losses import Losses, locate
-from verification.bounds.neighbours import squared
-from verification.bounds.pattern_search import FoundFactor, worst_piece
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.differences import uniform_piece
+from verification.semidefinite.losses import Losses, locate
+from verification.semidefinite.neighbours import squared
+from verification.semidefinite.pattern_search import FoundFactor, worst_piece
 
 #: Labels whose worst pair is an eigenvector; of the others it is searched.
 EIGENVALUES = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from linear_couplings import Linear
 
 import verification as vf
-from verification.advice.methods import METHODS, MOST, NEAR, MethodRow, advised, at_most, rows, steps
-from verification.advice.spectrum import Spectrum
+from verification.coupling.methods import METHODS, MOST, NEAR, MethodRow, advised, at_most, rows, steps
+from verification.coupling.spectrum import Spectrum
 
 
 def by_hand(values, theta, tolerance=1e-6, solution=1.0):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import verification as vf
-from verification.bounds.lipschitz import enclose
-from verification.bounds.mirror import Mirror
-from verification.bounds.multipliers import QuadraticForms
+from verification.semidefinite.lipschitz import enclose
+from verification.semidefinite.mirror import Mirror
+from verification.semidefinite.multipliers import QuadraticForms
 
 THETA = 0.7
 

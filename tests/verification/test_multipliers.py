@@ -13,10 +13,10 @@ from scipy.linalg import block_diag, eigh
 from strategies import AT_NIGHT
 
 from ndtheory import energy_norms
-from verification.bounds.interior_point import LMIError
-from verification.bounds.multipliers import NARROW, QuadraticForms, friction_threshold
-from verification.bounds.pattern_search import largest_factor, worst_piece
 from verification.interface.pair import ContactPair
+from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite.multipliers import NARROW, QuadraticForms, friction_threshold
+from verification.semidefinite.pattern_search import largest_factor, worst_piece
 
 Multipliers = tuple[np.ndarray, ...]
 

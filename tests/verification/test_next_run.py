@@ -12,8 +12,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import verification as vf
-from verification.advice.pace import pooled
-from verification.advice.readings import Made, NextRun, anew, kept, pasted_or_not
+from verification.coupling.pace import pooled
+from verification.coupling.readings import Made, NextRun, anew, kept, pasted_or_not
 
 
 def level(steps):

@@ -10,11 +10,11 @@ from scipy.linalg import eigh
 import verification as vf
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.bounds.lipschitz import enclose
-from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.neighbours import Neighbours, Patterns, responses, squared
-from verification.bounds.pattern_search import Search, factor_search, largest_factor, signs, worst_piece
 from verification.contact.active_set import Pattern
+from verification.semidefinite.lipschitz import enclose
+from verification.semidefinite.multipliers import QuadraticForms
+from verification.semidefinite.neighbours import Neighbours, Patterns, responses, squared
+from verification.semidefinite.pattern_search import Search, factor_search, largest_factor, signs, worst_piece
 
 N, THETA = 4, 0.6
 

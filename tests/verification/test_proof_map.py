@@ -11,8 +11,8 @@ from matplotlib.textpath import TextPath
 
 import verification as vf
 from ndtheory.statements import proof_of, statements
-from verification.bounds.losses import EXACT, LossForms, Suprema, locate, quotients, suprema
 from verification.figures.proof_map import BOX, CHAIN, LOOKS, PRINTED, STEPS, WIDTH, draw_map, width_of
+from verification.semidefinite.losses import EXACT, LossForms, Suprema, locate, quotients, suprema
 
 SVG = "{http://www.w3.org/2000/svg}"
 PROPOSITIONS = [id for id, one in statements().items() if one.kind in ("theorem", "proposition", "lemma")]

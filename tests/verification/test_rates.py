@@ -17,7 +17,7 @@ import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.rates import CLEAR_OF_NOISE, largest_step_ratio, noise, observed_rate, rate_at_the_end
 from verification.algorithm.runs import Run, run
-from verification.verdicts import TIGHT, judge
+from verification.bounds.verdicts import TIGHT, judge
 
 EPSILON = sys.float_info.epsilon
 

@@ -7,10 +7,10 @@ from problem_list import small
 import verification as vf
 from verification import figures
 from verification.algorithm.relaxation import RULES
-from verification.bounds import region
 from verification.bounds.table import BOUNDS, certifying
 from verification.interface.friction import LAWS
 from verification.output.folder import Folder
+from verification.sweeps import region
 from verification.sweeps.grid import SweepGrid
 
 PROBLEM = vf.Problem.from_dict(small())

@@ -6,7 +6,7 @@ from problem_list import plates
 import verification as vf
 from verification.bounds.bound import Bound, BoundResult, Thresholds
 from verification.bounds.table import BOUNDS
-from verification.sections.layout import text
+from verification.show.layout import text
 
 
 class Silent(Bound):

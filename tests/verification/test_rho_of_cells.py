@@ -14,7 +14,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from fem1d2d import plane_strain
 from fem1d2d.layers import Interface, Layer, peaks
-from fem1d2d.layers_proved import HalfPlane, enclosed_ratio
+from fem1d2d.proofs.layers_proved import HalfPlane, enclosed_ratio
 from verification.constants.cells import halved_cells, rho_of_cells
 
 F = Fraction

@@ -11,12 +11,12 @@ from problem_list import blocks
 from strategies import AT_NIGHT
 
 import verification as vf
-from fem1d2d.enclosed import UNIT, Enclosed
-from fem1d2d.loewner import positive_definite
-from verification.bounds.interior_point import LMIError
-from verification.bounds.multipliers import QuadraticForms
+from fem1d2d.proofs.enclosed import UNIT, Enclosed
+from fem1d2d.proofs.loewner import positive_definite
 from verification.constants import measure
 from verification.interface.pair import pair_from
+from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite.multipliers import QuadraticForms
 
 Exact = list[list[Fraction]]
 

@@ -8,8 +8,8 @@ import pytest
 from problem_list import small
 
 import verification as vf
-from verification.bounds import trace_forms
-from verification.bounds.trace_forms import TraceForms
+from verification.semidefinite import trace_forms
+from verification.semidefinite.trace_forms import TraceForms
 
 
 def exact(matrix):

@@ -7,8 +7,8 @@ import pytest
 from flint import fmpq, fmpq_mat
 
 import verification as vf
-from verification.bounds import trace_forms
-from verification.bounds.trace_forms import TraceForms
+from verification.semidefinite import trace_forms
+from verification.semidefinite.trace_forms import TraceForms
 
 #: Nodes of the Neumann grid where the grids differ, and of the contact grid.
 N, n = 3, 4

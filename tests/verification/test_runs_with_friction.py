@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.advice.readings import Observed
-from verification.advice.runs_with_friction import friction_bounds, least_rate, next_with_friction
+from verification.coupling.readings import Observed
+from verification.coupling.runs_with_friction import friction_bounds, least_rate, next_with_friction
 
 THETAS, RATIOS = st.fractions(F(1, 10**4), 1), st.fractions(F(1, 1000), 20)
 

@@ -17,11 +17,11 @@ from verification.bounds.table import BOUNDS
 from verification.cli import main
 from verification.document import Document
 from verification.output.report import report
-from verification.sections import comparison as of_comparison
-from verification.sections import numbers
-from verification.sections.layout import lines, text
-from verification.sections.of_results import of
-from verification.sections.parts import (
+from verification.show import comparison as of_comparison
+from verification.show import numbers
+from verification.show.layout import lines, text
+from verification.show.of_results import of
+from verification.show.parts import (
     Block,
     Facts,
     Labelled,
@@ -222,7 +222,7 @@ def test_no_module_of_sections_names_a_bound():
 
 def test_sections_are_made_without_a_terminal_a_browser_and_a_figure():
     heavy = ["click", "rich", "matplotlib", "jinja2", "verification.cli", "verification.figures", "verification.output"]
-    code = f"import sys, verification.sections.of_results; print([name for name in {heavy} if name in sys.modules])"
+    code = f"import sys, verification.show.of_results; print([name for name in {heavy} if name in sys.modules])"
     done = ended(code)
     assert done.stdout.strip() == "[]"
 

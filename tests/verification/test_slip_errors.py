@@ -12,10 +12,10 @@ from problem_list import changed
 from scipy.linalg import eigh
 
 import verification as vf
-from verification.bounds import interior_point, model
-from verification.bounds.slip_errors import STATES, SlipErrors
+from verification.algorithm.monolithic import contact_system
 from verification.interface.assembly import discretise
-from verification.monolithic import contact_system
+from verification.semidefinite import interior_point, model
+from verification.semidefinite.slip_errors import STATES, SlipErrors
 from verification.testing.strategies import SEEDS
 
 BODIES = {

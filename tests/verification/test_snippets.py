@@ -12,8 +12,8 @@ import pytest
 from processes import environment
 
 import verification as vf
-from verification.advice.methods import METHODS
-from verification.advice.snippets import SNIPPETS, CouplingScheme, snippet
+from verification.coupling.methods import METHODS
+from verification.coupling.snippets import SNIPPETS, CouplingScheme, snippet
 
 #: The checker of configurations that preCICE installs.
 VALIDATE = shutil.which("precice-config-validate")

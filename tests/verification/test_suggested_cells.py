@@ -11,8 +11,8 @@ from test_rho_of_cells import blocks, halved_by_hand
 
 import verification as vf
 from ndtheory import Number
-from verification.advice.cells import GAIN, suggest
 from verification.constants.cells import halved_cells, rho_of_cells
+from verification.coupling.cells import GAIN, suggest
 
 F = Fraction
 

@@ -12,11 +12,11 @@ from kinds import KINDS, problem
 from strategies import AT_NIGHT
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from verification import threads
-from verification.bounds.multipliers import QuadraticForms
 from verification.constants import measure
 from verification.interface.pair import pair_from
-from verification.threads import one_thread
+from verification.machine import threads
+from verification.machine.threads import one_thread
+from verification.semidefinite.multipliers import QuadraticForms
 
 THREADS = 8
 

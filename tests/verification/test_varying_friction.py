@@ -17,6 +17,7 @@ from scipy.linalg import eigh
 
 import verification as vf
 from ndtheory.number import exact
+from verification.algorithm.monolithic import solve
 from verification.bounds.bound import Subject, Thresholds
 from verification.bounds.table import BOUNDS
 from verification.certificate import check
@@ -25,9 +26,8 @@ from verification.certificate.continuum import certify_continuum
 from verification.certificate.contraction import certify, check_again
 from verification.interface.build import build
 from verification.interface.files import write_interface
-from verification.monolithic import solve
 from verification.problem.specs import Profile
-from verification.sections.layout import text
+from verification.show.layout import text
 from verification.sweeps.identity import Identity
 from verification.sweeps.sweep import sweep
 from verification.testing.bounds import observed

@@ -17,15 +17,15 @@ from verification.algorithm.linearisation import NotLinear, forecast
 from verification.algorithm.rates import StepRatio, largest_step_ratio
 from verification.bounds import LARGEST
 from verification.bounds.bound import Subject
-from verification.bounds.interior_point import LMIError
-from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
+from verification.bounds.verdicts import TIGHT, judge, judge_bound, judge_forecast
 from verification.comparison import compare
 from verification.constants import measure
 from verification.interface.files import read_interface, write_interface
 from verification.interface.pair import pair_from
 from verification.ledger.cases import problem
-from verification.verdicts import TIGHT, judge, judge_bound, judge_forecast
+from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite.multipliers import QuadraticForms
 
 BOUND = 0.5
 SLACK = TIGHT * (1 - BOUND)
@@ -161,7 +161,7 @@ def test_a_solver_that_gives_up_is_told_from_a_bound_that_is_not_below_1(monkeyp
     def fail(program):
         raise LMIError("the solver gave up: made up")
 
-    monkeypatch.setattr("verification.bounds.interior_point.solve", fail)
+    monkeypatch.setattr("verification.semidefinite.interior_point.solve", fail)
     slight, strong = compare(square_blocks(4)), compare(square_blocks(4, friction=2))
     assert slight.bounds["lmi"].factor.value <= slight.bounds["energy"].factor.value
     assert slight.verdicts["lmi"].verdict == "CONSISTENT"

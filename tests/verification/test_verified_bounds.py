@@ -15,11 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import AT_NIGHT
 
-from fem1d2d import bar, element, exact, interval, plane_strain, rectangle
-from fem1d2d.enclosed import Enclosed, gamma
-from fem1d2d.exact import Shapes, fractions
-from fem1d2d.loewner import Elimination, positive_definite
-from fem1d2d.proved import enclose_largest, inverse, root
+from fem1d2d import bar, element, interval, plane_strain, rectangle
+from fem1d2d.proofs import exact
+from fem1d2d.proofs.enclosed import Enclosed, gamma
+from fem1d2d.proofs.exact import Shapes, fractions
+from fem1d2d.proofs.loewner import Elimination, positive_definite
+from fem1d2d.proofs.proved import enclose_largest, inverse, root
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 KINDS = (

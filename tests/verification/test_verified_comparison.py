@@ -11,15 +11,15 @@ import verification as vf
 from ndtheory import PRINTED, Constants, EnergyConstants, Number, evaluate, evaluate_energy
 from verification.algorithm.rates import StepRatio
 from verification.bounds.bound import BoundResult
-from verification.bounds.lipschitz import work_out
-from verification.bounds.multipliers import QuadraticForms
+from verification.bounds.verdicts import judge, judge_bound
 from verification.certificate.claims import Claims, Confirmation, NoCertificate, describe
 from verification.certificate.contraction import certify
+from verification.certificate.exact_bodies import NotExact
+from verification.certificate.proved_constants import verify
 from verification.constants import measure
-from verification.constants.proved import verify
-from verification.interface.exact_bodies import NotExact
 from verification.interface.pair import pair_from
-from verification.verdicts import judge, judge_bound
+from verification.semidefinite.lipschitz import work_out
+from verification.semidefinite.multipliers import QuadraticForms
 
 SMALL = vf.Problem.from_dict(small())
 

@@ -11,10 +11,10 @@ import scipy.sparse as sp
 from mpmath import mp
 
 import verification as vf
-from fem1d2d.enclosed import Enclosed
-from fem1d2d.loewner import Elimination
+from fem1d2d.proofs.enclosed import Enclosed
+from fem1d2d.proofs.loewner import Elimination
 from ndtheory import REPAIRED, Constants, evaluate
-from verification.constants.proved import verify
+from verification.certificate.proved_constants import verify
 from verification.interface.interface import Law
 
 NAMES = (

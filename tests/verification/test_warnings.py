@@ -12,10 +12,10 @@ from problem_list import SHEARED, changed, plates
 
 import verification as vf
 from fem1d2d import rectangle
+from verification.algorithm.monolithic import contact_system
 from verification.cli.problems import examples
 from verification.interface.assembly import LOCKING, discretise
 from verification.interface.friction import SHARE
-from verification.monolithic import contact_system
 
 
 def warned(data):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from verification.algorithm.monolithic import Solution
 from verification.algorithm.runs import Run
-from verification.monolithic import Solution
 
 
 def assert_same(run: Run, solution: Solution) -> None:

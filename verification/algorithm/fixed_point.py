@@ -15,7 +15,7 @@ from verification.contact import ContactSolution, ContactStep, Solver
 from verification.contact.active_set import Systems
 from verification.dense import times
 from verification.interface.pair import ContactPair
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
 
 #: Steps after which (I) is solved anew.  On the sample problems of the tests, 400 steps each, its displacement then
 #: stays within 35 units in the last place of the solved one in the energy norm; never solved anew, within 530.  T then

@@ -13,9 +13,9 @@ from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
+from verification.algorithm.monolithic import solution_force
 from verification.algorithm.rates import CLEAR_OF_NOISE, noise, noises, observed_rate, rate_of
 from verification.interface.pair import ContactPair
-from verification.monolithic import solution_force
 
 #: Largest number of contact nodes for a linearisation: eigenvalues of larger Jacobians take minutes.
 MOST_NODES = 300

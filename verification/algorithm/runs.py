@@ -19,6 +19,7 @@ from verification.algorithm.ending import LAST_ITERATE, NO_FORCE, Ending, Outcom
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, at_solution, forecast, linearise
+from verification.algorithm.monolithic import SolveError
 from verification.algorithm.rates import ObservedRate, observed_rate
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.remedy import Remedy, remedy_of
@@ -32,11 +33,10 @@ from verification.interface.build import pair_of
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
-from verification.interrupts import INTERRUPTED
-from verification.monolithic import SolveError
+from verification.machine.interrupts import INTERRUPTED
+from verification.machine.threads import one_thread
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
-from verification.threads import one_thread
 
 if TYPE_CHECKING:
     from verification.document import Figure

@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
 from ndtheory.number import Level, Numeric, above, below
-from verification.progress import Progress, silent
+from verification.machine.progress import Progress, silent
 from verification.value import to_plain
 
 if TYPE_CHECKING:
-    from verification.bounds.lipschitz import Enclosure
-    from verification.bounds.multipliers import QuadraticForms
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
+    from verification.semidefinite.lipschitz import Enclosure
+    from verification.semidefinite.multipliers import QuadraticForms
 
 #: The thetas between two values.
 Ends = tuple[float, float]

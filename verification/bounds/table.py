@@ -15,14 +15,14 @@ from ndtheory.texts import did_you_mean
 from verification.bounds import LARGEST
 from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Removed, Subject, Thresholds, trace
 from verification.document import Document
-from verification.progress import Progress, silent
+from verification.machine.progress import Progress, silent
 from verification.value import to_plain
 
 if TYPE_CHECKING:
-    from verification.bounds.lipschitz import Enclosure
-    from verification.bounds.multipliers import QuadraticForms
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
+    from verification.semidefinite.lipschitz import Enclosure
+    from verification.semidefinite.multipliers import QuadraticForms
 
 #: Friction values that trace the border of the region of the semidefinite bound, at most.
 TRACED = 25
@@ -148,8 +148,8 @@ class SemidefiniteBound(Bound):
             return self.absent("needed a pair of bodies and a theta")
         if subject.pair.contact.grid.n > LARGEST:
             return self.absent(f"{subject.pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
-        from verification.bounds.interior_point import LMIError
-        from verification.bounds.lipschitz import work_out
+        from verification.semidefinite.interior_point import LMIError
+        from verification.semidefinite.lipschitz import work_out
 
         chosen = relaxation_factor(theta)
         theta = float(chosen)
@@ -190,15 +190,15 @@ class SemidefiniteBound(Bound):
     def enclose(
         self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
     ) -> Enclosure:
-        from verification.bounds.lipschitz import CERTIFIED, CLOSE, budget, enclose
+        from verification.semidefinite.lipschitz import CERTIFIED, CLOSE, budget, enclose
 
         programs = min(CERTIFIED, 20 * budget(pair.contact.grid.n)) if exact else 1
         gap = CLOSE if exact else float("inf")
         return enclose(pair, forms, theta, gap=gap, programs=programs, progress=progress)
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
-        from verification.bounds.interior_point import LMIError
-        from verification.bounds.lipschitz import thetas
+        from verification.semidefinite.interior_point import LMIError
+        from verification.semidefinite.lipschitz import thetas
 
         pair, measured = subject.pair, subject.measured
         if pair is None or measured is None or measured.friction_threshold is None:

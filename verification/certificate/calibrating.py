@@ -1,4 +1,5 @@
-"""Calibrations of a rectangle with large weights, found by a conic solver; :mod:`ndtheory.calibration` checks them.
+"""Calibrations of a rectangle with large weights, found by a conic solver; :mod:`ndtheory.continuum.calibration` checks
+them.
 
 The conditions on the values of the field at the nodes are linear matrix inequalities: by Schur's complement
 ``A - N C^-1 N >= 0`` says that the matrix of A, N and C is positive semidefinite.  The solver works in doubles, so that
@@ -17,9 +18,9 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-from ndtheory.calibration import Calibration, Cubic
+from ndtheory.continuum.calibration import Calibration, Cubic
 from ndtheory.errors import HypothesisError
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
 
 #: Lines of the grid between the clamped side and Gamma_c: finer towards Gamma_c, where the fields turn fastest.
 DEPTHS = tuple(Fraction(n, 100) for n in (0, 30, 55, 75, 88, 95, 100))

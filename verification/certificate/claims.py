@@ -19,16 +19,16 @@ import numpy as np
 from flint import ctx
 from numpy.typing import NDArray
 
-from verification.bounds.interior_point import Weights
 from verification.certificate.check import check, surface_stiffness
+from verification.certificate.exact_bodies import ExactInterface, NotExact, exact_normals, exact_points
 from verification.constants.measured import FROM_MATRICES
 from verification.dense import STILL
 from verification.interface.body import Body
-from verification.interface.exact_bodies import ExactInterface, NotExact, exact_normals, exact_points
 from verification.interface.pair import ContactPair, pair_from
+from verification.machine.progress import Progress, silent
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
-from verification.progress import Progress, silent
+from verification.semidefinite.interior_point import Weights
 
 #: Shares by which 1 minus a factor is made smaller, until the multipliers prove it for the rational bodies.
 MARGINS = (1e-10, 1e-8, 1e-6, 1e-4, 1e-2)

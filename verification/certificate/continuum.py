@@ -16,7 +16,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
-from ndtheory.continuum import (
+from ndtheory.continuum.intervals import Interval
+from ndtheory.continuum.rectangles import (
     ContinuumConstants,
     Rectangle,
     TwoRectangles,
@@ -26,16 +27,15 @@ from ndtheory.continuum import (
     statement,
     upper,
 )
-from ndtheory.intervals import Interval
 from ndtheory.moduli import half_planes
 from verification.certificate.calibrating import for_cut_off, for_traces
 from verification.constants.cells import OfCells, rho_of_cells
 from verification.constants.measuring import of_energy
 from verification.document import Document
 from verification.interface.pair import pair_from
+from verification.machine.progress import Progress, silent
+from verification.machine.threads import one_thread
 from verification.problem import Problem, ProblemError
-from verification.progress import Progress, silent
-from verification.threads import one_thread
 
 #: Radius of the kernel without friction, where C_s plays no part.
 ANY_RADIUS = Fraction(1)

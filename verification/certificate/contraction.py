@@ -16,18 +16,18 @@ from typing import Any, ClassVar
 from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
-from verification.bounds.conditions import Conditions
-from verification.bounds.interior_point import LMIError
-from verification.bounds.lipschitz import Division, Leaf
-from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS, certifying, strongest
 from verification.certificate import check
 from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, describe, same, written
 from verification.constants import Measured, measure
 from verification.document import Document
 from verification.interface.pair import UNITS, ContactPair, pair_from
+from verification.machine.progress import Progress, silent
 from verification.problem import Problem, ProblemError, load
-from verification.progress import Progress, silent
+from verification.semidefinite.conditions import Conditions
+from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite.lipschitz import Division, Leaf
+from verification.semidefinite.multipliers import QuadraticForms
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -6,7 +6,7 @@ import sys
 import warnings
 
 try:
-    from verification.interrupts import undisturbed
+    from verification.machine.interrupts import undisturbed
 
     with undisturbed():  # an import that is interrupted may fail in any way
         with warnings.catch_warnings():

@@ -11,23 +11,23 @@ from click.shell_completion import CompletionItem
 
 from ndtheory import HypothesisError, exact
 from ndtheory.texts import did_you_mean
-from verification.advice.snippets import SNIPPETS
 from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import AdviseCommand, AdviseGroup, Default
 from verification.cli.options import JSON, SET, SWAP, F, OneOf, Typed
 from verification.cli.problems import load_problem
-from verification.sections.layout import nothing_typed
+from verification.coupling.snippets import SNIPPETS
+from verification.show.layout import nothing_typed
 
 if TYPE_CHECKING:
-    from verification.advice.roles import Advice
-    from verification.progress import Progress
+    from verification.coupling.roles import Advice
+    from verification.machine.progress import Progress
 
 
 def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -> Advice:
     """The advice from the options of ``advise matrices`` that were given, S1 among them, by parameter."""
-    from verification.advice.from_matrices import advise_matrices
-    from verification.advice.matrix_files import is_interface, names_in, read_matrix, read_vector
-    from verification.advice.roles import advise
+    from verification.coupling.from_matrices import advise_matrices
+    from verification.coupling.matrix_files import is_interface, names_in, read_matrix, read_vector
+    from verification.coupling.roles import advise
 
     context = click.get_current_context()
     S1, S2 = given["S1"], given.get("S2")
@@ -64,7 +64,7 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
 
 def _grids(transfer: Path, given: Mapping[str, Any]) -> dict[str, Any]:
     """The positions and weights of both grids, where the file of the transfer has them and no option gives them."""
-    from verification.advice.matrix_files import names_in, read_array
+    from verification.coupling.matrix_files import names_in, read_array
 
     held = set(names_in(transfer))
     wanted = {"x_neumann": "x_neumann", "x": "x_contact", "weights": "weights_contact"}
@@ -124,7 +124,7 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     if file.suffix in (".log", ".csv", ".dat"):
         raise click.UsageError(f"{file}: for a log type ndtheory advise run --log {file} --theta X", context)
     problem = file if file.suffix == ".npz" else load_problem(file, keys, swap=swap)
-    from verification.advice import roles
+    from verification.coupling import roles
 
     with stages() as tell:
         found = roles.advise(problem, tied=tied, progress=tell)
@@ -275,9 +275,9 @@ def run(
         raise click.UsageError(f"{received}: needed one --theta for each log, or one with --ratio", context)
     if tied and friction:
         raise click.UsageError("received --tied with --friction: nothing slips on a tied interface", context)
-    from verification.advice.from_logs import advise_logs
-    from verification.advice.from_runs import advise_run
-    from verification.advice.log_lines import PatternError
+    from verification.coupling.from_logs import advise_logs
+    from verification.coupling.from_runs import advise_run
+    from verification.coupling.log_lines import PatternError
 
     try:
         if ratio is None:
@@ -295,7 +295,7 @@ def _thetas_of(logs: Sequence[Path], thetas: Sequence[str], pattern: str | None)
     """The theta of each log; fewer than logs are for those whose relaxation was constant and that name no factor."""
     if not thetas or len(thetas) >= len(logs):
         return thetas or (None,) * len(logs)
-    from verification.advice.log_files import read_log
+    from verification.coupling.log_files import read_log
 
     read = [read_log(path, pattern) for path in logs]
     wanted = [log.accelerator is None and log.theta is None for log in read]
@@ -384,7 +384,7 @@ def moduli(shape: dict[str, Any], parallel: bool, as_json: bool, **given: str | 
     if not {"young", "conductivity", "density"} & data.keys():
         received = f"received {f'--{min(data)} alone' if data else 'no material'}"
         raise click.UsageError(f"{received}: needed --young and --poisson, --conductivity, or --density", context)
-    from verification.advice.from_moduli import advise_moduli
+    from verification.coupling.from_moduli import advise_moduli
 
     try:
         found = advise_moduli(**data, **shape, parallel=parallel)
@@ -416,8 +416,8 @@ def vectors(iterates: Path, images: Path | None, tied: bool, snippets: str | Non
     """
     context = click.get_current_context()
     _no_document_of(snippets, as_json)
-    from verification.advice.from_vectors import advise_vectors
-    from verification.advice.matrix_files import names_in, read_array, read_matrix
+    from verification.coupling.from_vectors import advise_vectors
+    from verification.coupling.matrix_files import names_in, read_array, read_matrix
 
     if images is None:
         if not {"X", "TX"} <= set(names_in(iterates)):
@@ -444,8 +444,8 @@ def _no_document_of(snippets: str | None, as_json: bool) -> None:
 
 def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | None = None) -> None:
     """Show the advice, or the blocks to paste where they were asked for and a theta is advised."""
-    from verification.sections.advice import sections
-    from verification.sections.advice import snippets as blocks
+    from verification.show.advice import sections
+    from verification.show.advice import snippets as blocks
 
     if snippets is not None and found.theta is not None:
         deliver(found, lambda found: blocks(found, snippets), as_json)

@@ -13,7 +13,7 @@ from verification.bounds.bound import NOT_ASKED, Subject
 from verification.bounds.table import BOUNDS, ENERGY, SECTION_5, Calculated, Energy, Section5
 from verification.cli.console import deliver
 from verification.cli.options import OneOf, check_place, one_file
-from verification.sections.bounds import sections
+from verification.show.bounds import sections
 
 #: The options by the constants that they give.
 OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}

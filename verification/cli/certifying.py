@@ -100,7 +100,7 @@ def certify(
     from verification.certificate.claims import NoCertificate
     from verification.certificate.contraction import certify as prove
     from verification.output.files import writing
-    from verification.sections.certificate import sections
+    from verification.show.certificate import sections
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
@@ -118,10 +118,10 @@ def _prove_continuum(
     file: Path, keys: Mapping[str, str], *, theta: str | None, swap: bool, target: Path | None, as_json: bool
 ) -> int:
     """Bound the continuous problem of a file and show what follows; 1 where contraction is not proved."""
-    from ndtheory.strip import Unproved
+    from ndtheory.continuum.strip import Unproved
     from verification.certificate.continuum import certify_continuum
     from verification.output.files import writing
-    from verification.sections.certificate import continuum
+    from verification.show.certificate import continuum
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
@@ -137,7 +137,7 @@ def _prove_continuum(
 def _check(path: Path, problem: Any, as_json: bool) -> int:
     from verification.certificate.contraction import check_again
     from verification.problem.tables import ProblemError, unreadable
-    from verification.sections.certificate import checked
+    from verification.show.certificate import checked
 
     if why := unreadable(path, MOST_BYTES):
         raise ProblemError(str(path), "", None, why)

@@ -18,10 +18,10 @@ import click
 
 from ndtheory.texts import printable
 from verification.document import Document
-from verification.interrupts import undisturbed
-from verification.progress import Progress, silent
-from verification.sections.layout import Typing, lines, nothing_typed
-from verification.sections.parts import Sections
+from verification.machine.interrupts import undisturbed
+from verification.machine.progress import Progress, silent
+from verification.show.layout import Typing, lines, nothing_typed
+from verification.show.parts import Sections
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -375,7 +375,7 @@ def reported(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def solver_failed(error: RuntimeError) -> bool:
     """True for errors of the solvers of step II and of the global method."""
+    from verification.algorithm.monolithic import SolveError
     from verification.contact import ContactError  # numpy: only now
-    from verification.monolithic import SolveError
 
     return isinstance(error, (ContactError, SolveError))

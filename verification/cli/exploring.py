@@ -32,7 +32,7 @@ def explore(file: Path, keys: dict[str, str], swap: bool, target: Path, as_json:
     """
     from verification.exploration import page
     from verification.output.files import staged
-    from verification.sections.exploration import sections
+    from verification.show.exploration import sections
 
     problem = load_problem(file, keys, swap=swap)
     check_place(target)

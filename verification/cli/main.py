@@ -41,7 +41,7 @@ from verification.cli.console import (
     steady,
 )
 from verification.cli.forms import AdviseGroup, Commands
-from verification.interrupts import second_ends
+from verification.machine.interrupts import second_ends
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, BAD_INPUT, INTERRUPTED, CRASH = 0, 2, 130, 70

@@ -13,7 +13,7 @@ from verification.cli.options import FOLDER, JSON, OneOf, Typed, of_a_run
 from verification.cli.problems import complain_of, load_problem, warn
 
 if TYPE_CHECKING:
-    from verification.history import Increment
+    from verification.algorithm.history import Increment
 
 
 @click.command()
@@ -40,10 +40,10 @@ def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bo
       ndtheory march my.toml --method monolithic --json
     """
     problem = load_problem(file, **changes)
-    from verification import history
+    from verification.algorithm import history
     from verification.algorithm.runs import Run
     from verification.output.folder import Folder
-    from verification.sections.history import sections
+    from verification.show.history import sections
 
     write = None if folder is None else Folder(folder, "march").write
     with stages() as tell:

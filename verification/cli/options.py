@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 import click
 
 from ndtheory.texts import did_you_mean
-from verification.sections.layout import nothing_typed
-from verification.sections.parts import Next
+from verification.show.layout import nothing_typed
+from verification.show.parts import Next
 
 F = TypeVar("F", bound=Callable[..., Any])
 

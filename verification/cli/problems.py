@@ -136,7 +136,7 @@ def constants(file: Path, keys: dict[str, str], swap: bool, refine: int, verifie
       ndtheory constants my.toml --set body1.young=2e4
     """
     from verification.constants import measure
-    from verification.sections.constants import sections
+    from verification.show.constants import sections
 
     problem = load_problem(file, keys, swap=swap)
     with stages() as tell:
@@ -164,12 +164,12 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
       ndtheory run my.toml --start g.npy
     """
     problem = load_problem(file, **changes)  # before what loads arrays: a file may be missing
-    from verification.advice.matrix_files import read_vector
     from verification.algorithm import runs
     from verification.algorithm.start import forces
+    from verification.coupling.matrix_files import read_vector
     from verification.interface.pair import pair_from
     from verification.output.folder import Folder
-    from verification.sections.run import sections
+    from verification.show.run import sections
 
     write = None if folder is None else Folder(folder, "run").write
     pair = pair_from(problem)
@@ -204,10 +204,10 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
       ndtheory solve my.toml -o results
       ndtheory solve my.toml --set 'body2.prescribed.top=[0, -0.03]'
     """
-    from verification import monolithic
+    from verification.algorithm import monolithic
     from verification.interface.assembly import discretise
     from verification.output.folder import Folder
-    from verification.sections import run
+    from verification.show import run
 
     problem = load_problem(file, keys)
     write = None if folder is None else Folder(folder, "solve").write
@@ -311,8 +311,8 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
     from verification import comparison as verdicts
     from verification.interface.pair import pair_from
     from verification.output.folder import Folder
-    from verification.sections.comparison import Parts
-    from verification.sections.comparison import verdicts as end
+    from verification.show.comparison import Parts
+    from verification.show.comparison import verdicts as end
 
     write = None if folder is None else Folder(folder, "compare").write
     pair = pair_from(problem)

@@ -18,7 +18,7 @@ from verification.cli.options import FILE, FOLDER, JOBS, JSON, SET, STORE, SWAP,
 from verification.cli.problems import load_problem
 
 if TYPE_CHECKING:
-    from verification.progress import Progress
+    from verification.machine.progress import Progress
     from verification.sweeps.sweep import Sweep
 
 
@@ -97,7 +97,7 @@ def sweep(
     """
     from verification.extras import require
     from verification.output.files import check_folder, check_ours
-    from verification.sections import sweep as shown
+    from verification.show import sweep as shown
     from verification.sweeps.grid import read_sweep
     from verification.sweeps.store import plan
     from verification.sweeps.sweep import sweep_grid, work_of
@@ -269,9 +269,9 @@ def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Pa
       ndtheory region my.toml --set body2.young=7e4 -o stiff.svg
     """
     from verification import figures
-    from verification.bounds.region import chart
     from verification.output.files import staged
-    from verification.sections.sweep import plane as sections
+    from verification.show.sweep import plane as sections
+    from verification.sweeps.region import chart
 
     problem = load_problem(file, keys, swap=swap)
     check_place(target)

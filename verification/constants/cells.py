@@ -12,9 +12,9 @@ from fem1d2d.layers import Interface, Layer, peaks
 from ndtheory import Number
 from ndtheory.moduli import half_planes
 from verification.interface.body import material_of
+from verification.machine.threads import one_thread
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
-from verification.threads import one_thread
 from verification.value import to_plain
 
 #: Columns of cells of a body in one period up to which the waves of both grids are joined: a tenth of a second.
@@ -154,7 +154,7 @@ def _largest(interface: Interface) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def _enclosed(interface: Interface, contact: BodySpec, neumann: BodySpec) -> OfCells:
-    from fem1d2d.layers_proved import HalfPlane, Unproved, enclosed_ratio
+    from fem1d2d.proofs.layers_proved import HalfPlane, Unproved, enclosed_ratio
 
     bodies = []
     for body in (contact, neumann):

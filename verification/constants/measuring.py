@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fem1d2d import Eigenvalue, elimination_order, largest, largest_sparse, solver
 from fem1d2d.mesh import Floats
 from ndtheory import Number
+from verification.certificate.proved_constants import verify
 from verification.constants.measured import (
     ALL_NAMES,
     FROM_MATRICES,
@@ -22,14 +23,13 @@ from verification.constants.measured import (
     Measured,
 )
 from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
-from verification.constants.proved import verify
 from verification.dense import Cholesky, pinned
 from verification.interface.assembly import TwoBodies
 from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair
+from verification.machine.progress import Progress, silent
+from verification.machine.threads import one_thread
 from verification.problem import Problem
-from verification.progress import Progress, silent
-from verification.threads import one_thread
 
 
 def measure(

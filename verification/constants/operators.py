@@ -32,9 +32,9 @@ from verification.interface.assembly import TooManyContactNodes, TwoBodies, held
 from verification.interface.body import Body
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
+from verification.machine.progress import Progress, silent
+from verification.machine.threads import one_thread
 from verification.problem import Problem, ProblemError, load
-from verification.progress import Progress, silent
-from verification.threads import one_thread
 
 #: The relative residual of Lanczos where it only has to say where to shift.
 ROUGH = 1e-3

@@ -12,7 +12,7 @@ from fem1d2d.mesh import Floats
 from verification.contact.active_set import ActiveSet, Pattern, Systems
 from verification.contact.kkt import KKT, TOLERANCE, KKTCertificate
 from verification.dense import STILL
-from verification.interrupts import undisturbed
+from verification.machine.interrupts import undisturbed
 from verification.value import Value
 
 if TYPE_CHECKING:

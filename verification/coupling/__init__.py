@@ -1,5 +1,1 @@
-"""Two solvers of any code coupled by vectors: the loop, or the next vector for your loop."""
-
-from verification.coupling.driver import Coupled, Coupling, CouplingError, CouplingState, couple
-
-__all__ = ["Coupled", "Coupling", "CouplingError", "CouplingState", "couple"]
+"""Couplings of two solvers: what is known of one, the advice that follows, and the loop itself."""

@@ -14,11 +14,11 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from ndtheory.constants import take
-from verification.advice.from_vectors import advice_of
-from verification.advice.roles import Advice
-from verification.advice.spectrum import Spectrum, seen_in
 from verification.algorithm.ending import RUNAWAY
 from verification.algorithm.relaxation import Rule, rule_of
+from verification.coupling.from_vectors import advice_of
+from verification.coupling.roles import Advice
+from verification.coupling.spectrum import Spectrum, seen_in
 from verification.interface.matrices import real_array
 from verification.value import Value
 

@@ -4,7 +4,8 @@ Its settings, in ``convergence_accelerators``, are those of any other accelerato
 
     {"type": "verification.coupling.kratos", "solver": "Body1", "data_name": "force", "rule": "iqn-ils", "theta": 0.5}
 
-It relaxes as :class:`~verification.coupling.Coupling` does, and prints at the end which method the vectors advise.
+It relaxes as :class:`~verification.coupling.driver.Coupling` does, and prints at the end which method the vectors
+advise.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 
 from fem1d2d.mesh import Floats
 from verification.coupling.driver import Coupling
-from verification.sections.layout import text
+from verification.show.layout import text
 
 #: What begins its lines in the log, as the names of other accelerators do.
 LABEL = "CouplingConvergenceAccelerator"
@@ -37,8 +38,8 @@ class Accelerator:
     Parameters
     ----------
     settings : mapping
-        ``rule`` and ``theta`` as for :class:`~verification.coupling.Coupling`, and ``echo_level``: from 1 on it prints
-        advice, from 4 on its rule.
+        ``rule`` and ``theta`` as for :class:`~verification.coupling.driver.Coupling`, and ``echo_level``: from 1 on it
+        prints advice, from 4 on its rule.
     say : callable
         Prints a text.
 

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
+from verification.algorithm.history import History
 from verification.algorithm.runs import Run, run
 from verification.bounds.bound import Bound, NotComputed, Region, Subject
-from verification.bounds.region import check_plane
 from verification.bounds.table import BOUNDS
 from verification.constants import Measured
 from verification.contact import ContactError
-from verification.history import History
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
+from verification.machine.progress import Progress
 from verification.problem.tables import ProblemError
-from verification.progress import Progress
+from verification.sweeps.region import check_plane
 
 #: The bodies are drawn until the relative residual is below this: later steps look the same at the size of a page.
 VISIBLE = 1e-3

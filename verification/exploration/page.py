@@ -13,6 +13,7 @@ import numpy as np
 
 from ndtheory import __version__
 from ndtheory.energy_norms import one_minus_square, predicted_factor, predicted_theta
+from verification.algorithm.history import History, march
 from verification.algorithm.runs import run
 from verification.bounds.bound import Region
 from verification.bounds.table import named
@@ -21,15 +22,14 @@ from verification.contact import ContactError
 from verification.document import Document
 from verification.exploration.film import FARTHEST, Film, drawn, film, packed, past, told
 from verification.exploration.javascript import function
-from verification.history import History, march
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair, pair_from
+from verification.machine.progress import Progress, silent
 from verification.problem import load
 from verification.problem.specification import Problem
 from verification.problem.specs import PLACES
 from verification.problem.steps import at_rest, moments
 from verification.problem.tables import ProblemError
-from verification.progress import Progress, silent
 
 #: Multiples of the problem's friction that are run; without friction, the frictions themselves.
 SHARES = tuple(Fraction(n, 4) for n in (0, 2, 4, 6, 8))

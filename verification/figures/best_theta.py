@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from verification.figures.style import BODY1, BODY2, THETA, new_figure, plain, styled
 
 if TYPE_CHECKING:  # scipy.optimize, which no other figure needs, comes with it
-    from verification.advice.best_theta import BestTheta
+    from verification.sweeps.best_theta import BestTheta
 
 #: Colours and line styles of the thetas that follow from only the moduli, without a mesh.
 OF_MODULI = (("0.35", ":"), ("0.35", (0, (6, 2, 1, 2))))

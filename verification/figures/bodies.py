@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 
 from fem1d2d import depths, stresses, von_mises
 from fem1d2d.mesh import Floats
+from verification.algorithm.monolithic import Solution
 from verification.algorithm.runs import Run
 from verification.figures import style
 from verification.figures.style import BODIES, FILLS, PRESSURE, SHEAR, legend_beside, mark_states, plain
 from verification.interface.assembly import TwoBodies
 from verification.interface.fields import ContactFields
-from verification.monolithic import Solution
 
 #: Stresses that colour the cells: what the colour bar calls them, and their values from the tensors.
 STRESSES = {"mises": ("von Mises stress", von_mises), "sigma_yy": (r"$\sigma_{yy}$", lambda tensors: tensors[:, 1, 1])}

@@ -11,6 +11,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from verification.algorithm.history import History
 from verification.figures.style import (
     SHEAR,
     STATES,
@@ -21,7 +22,6 @@ from verification.figures.style import (
     plain,
     styled,
 )
-from verification.history import History
 
 #: Colours of the states in a map; the orange of slip and the grey of open nodes look alike in grey print.
 MAP = {"stick": STATES["stick"], "slip": STATES["slip"], "open": "#F4F4F4"}

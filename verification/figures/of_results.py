@@ -12,12 +12,13 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from ndtheory import EDITIONS, EnergyConstants
-from verification.advice.roles import Advice
+from verification.algorithm.history import History
+from verification.algorithm.monolithic import Solution
 from verification.algorithm.runs import Run
-from verification.bounds.region import Plane
 from verification.bounds.table import Calculated
 from verification.comparison import Comparison
 from verification.constants import Measured
+from verification.coupling.roles import Advice
 from verification.figures.bodies import draw_bodies
 from verification.figures.factor import draw_factor
 from verification.figures.history import draw_history
@@ -26,9 +27,8 @@ from verification.figures.reproduction import draw_reproduction
 from verification.figures.residuals import draw_residuals
 from verification.figures.squares import draw_squares
 from verification.figures.sweep import draw_sweep
-from verification.history import History
-from verification.monolithic import Solution
 from verification.reproduce.experiments import Reproduction
+from verification.sweeps.region import Plane
 from verification.sweeps.sweep import Sweep
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from verification.bounds.region import Plane
 from verification.bounds.table import BOUNDS
 from verification.figures.style import OUTCOMES, THETA, ink, legend_beside, new_figure, plain, styled
+from verification.sweeps.region import Plane
 
 #: The enlarged part ends this much above the largest friction of which something is proved.
 ROOM = 1.3

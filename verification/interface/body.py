@@ -34,8 +34,8 @@ from fem1d2d import (
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
 from verification.interface.interface import Grid, Nodes
+from verification.machine.threads import one_thread
 from verification.problem.specs import BodySpec
-from verification.threads import one_thread
 from verification.value import Value, copied, freeze, lent, original_of
 
 Name = Literal["body1", "body2"]

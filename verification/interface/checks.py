@@ -17,8 +17,8 @@ from verification.interface.body import Body
 from verification.interface.fields import ContactFields
 from verification.interface.joining import obstacle_level
 from verification.interface.pair import ContactPair
+from verification.machine.threads import one_thread
 from verification.problem.specs import BodySpec
-from verification.threads import one_thread
 from verification.value import Value
 
 #: Strain from which a warning is given: linear elasticity is for small strains.

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem1d2d.mesh import Floats
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
 from verification.value import Value
 
 #: Largest number of rows of a matrix, for a dense eigenvalue problem.

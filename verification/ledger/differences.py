@@ -20,13 +20,13 @@ from scipy.linalg import eigh
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.bounds.losses import LossForms, square, top
-from verification.bounds.neighbours import Factors, squared
-from verification.bounds.pattern_search import Form, signs, worst_piece
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
+from verification.semidefinite.losses import LossForms, square, top
+from verification.semidefinite.neighbours import Factors, squared
+from verification.semidefinite.pattern_search import Form, signs, worst_piece
 
 #: Numbers of steps, tried one after the other, in which a force is brought up where the active set cycles: of 19 such
 #: cases on the quick level 11 need 16 steps, 6 need 64 and 2 need 256.

@@ -24,22 +24,22 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from fem1d2d.enclosed import Enclosed, upwards
 from fem1d2d.mesh import Floats
-from fem1d2d.proved import Ends
+from fem1d2d.proofs.enclosed import Enclosed, upwards
+from fem1d2d.proofs.proved import Ends
 from ndtheory import Number, energy_norms
 from ndtheory import bounds as formulas
-from ndtheory.intervals import Interval
+from ndtheory.continuum.intervals import Interval
 from ndtheory.number import SLACK, decimal, directed, working_precision
-from verification.constants.proved import Between, Proof, entries
+from verification.certificate.proved_constants import Between, Proof, entries
 from verification.interface.body import Condensed, material_of
 from verification.ledger.cases import ENCLOSED, three_digits
 from verification.ledger.differences import directions, uniform_piece
 from verification.ledger.evidence import Evidence, Form, source
 from verification.ledger.inequalities import ENTRIES, SEED, RightSides, terms_of
 from verification.ledger.worst import Trial
+from verification.machine.progress import silent
 from verification.problem.specification import Problem
-from verification.progress import silent
 
 #: So many times the friction of its problems, what Section 5 prints from (5.31) on fails in a small unit of stress.
 MUCH = Fraction(10**8)

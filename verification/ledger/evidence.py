@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
 
 Level = Literal["quick", "full"]
 Method = Literal["symbolic", "dimension", "verified", "discrete", "reading"]

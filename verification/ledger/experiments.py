@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from verification.algorithm.monolithic import solution_force
 from verification.algorithm.runs import Run, run
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
 from verification.ledger.evidence import Evidence, Level, figure, source
-from verification.monolithic import solution_force
 from verification.reproduce import READINGS, ModelReading, reproduce
 from verification.reproduce.claims import CLAIMS, HARD, OPTIMUM, SERVES, SOFT, Claim, Curve, zones
 from verification.reproduce.experiments import Outcome, Result, curve_of

@@ -19,7 +19,7 @@ import numpy as np
 
 from ndtheory import PRINTED, energy_norms
 from ndtheory import bounds as formulas
-from ndtheory.intervals import Interval
+from ndtheory.continuum.intervals import Interval
 from verification.constants import Measured
 from verification.ledger.differences import Difference
 from verification.ledger.evidence import Form

@@ -14,14 +14,14 @@ import numpy as np
 from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
-from verification.bounds.losses import square
 from verification.interface.pair import ContactPair
 from verification.ledger.cases import three_digits
 from verification.ledger.differences import Difference, DrawnSetting, along, between, uniform_piece
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.ledger.inequalities import SEED, Reading
 from verification.ledger.worst import Trial, draw_cases
-from verification.threads import one_thread
+from verification.machine.threads import one_thread
+from verification.semidefinite.losses import square
 
 #: Random problems, beside the named ones.
 COUNT: dict[str, int] = {"quick": 6, "full": 60}

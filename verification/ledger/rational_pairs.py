@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d import element
-from fem1d2d.exact import Shapes
+from fem1d2d.proofs.exact import Shapes
 from verification.algorithm.fixed_point import FixedPointMap
+from verification.certificate.exact_bodies import ExactInterface, exact_points
 from verification.interface.body import Condensed, material_of
-from verification.interface.exact_bodies import ExactInterface, exact_points
 from verification.interface.pair import pair_from
 from verification.ledger.cases import rectangle
 from verification.ledger.evidence import Evidence, source

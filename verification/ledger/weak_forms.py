@@ -24,6 +24,7 @@ from fem1d2d import solver
 from fem1d2d.mesh import Floats
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
+from verification.algorithm.monolithic import solve
 from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
 from verification.interface.body import Body, Condensed
@@ -31,7 +32,6 @@ from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.cases import PROBLEMS, drawn
 from verification.ledger.curves import curved
 from verification.ledger.evidence import Evidence, Level, figure
-from verification.monolithic import solve
 from verification.problem.specification import Problem
 
 #: Every draw of random numbers starts from it.

@@ -13,7 +13,6 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 from fem1d2d.mesh import Floats
-from verification.bounds.losses import top
 from verification.constants import Measured, measure
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair, pair_from
@@ -30,8 +29,9 @@ from verification.ledger.inequalities import (
     Inequality,
     Reading,
 )
+from verification.machine.threads import one_thread
 from verification.problem.specification import Problem
-from verification.threads import one_thread
+from verification.semidefinite.losses import top
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

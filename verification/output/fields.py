@@ -11,10 +11,10 @@ from fem1d2d import stresses, von_mises
 from fem1d2d.mesh import Floats
 from ndtheory import __version__
 from ndtheory.texts import printable
+from verification.algorithm.history import History
+from verification.algorithm.monolithic import Solution
 from verification.algorithm.runs import Run
-from verification.history import History
 from verification.interface.body import Body
-from verification.monolithic import Solution
 
 #: The cells of a mesh by its dimension, as VTK calls them.
 CELLS = {1: "line", 2: "triangle"}

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from verification.document import Document
-from verification.interrupts import cleaned_up, undisturbed
+from verification.machine.interrupts import cleaned_up, undisturbed
 from verification.problem.tables import ProblemError, unreadable
 
 try:

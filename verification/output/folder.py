@@ -10,8 +10,8 @@ from ndtheory import __version__
 from verification.algorithm.runs import Run
 from verification.document import Document
 from verification.interface.files import write_interface, write_transfer
-from verification.interrupts import undisturbed
 from verification.ledger import sheets
+from verification.machine.interrupts import undisturbed
 from verification.output.fields import write_fields, write_series
 from verification.output.files import (
     FILES,
@@ -28,11 +28,11 @@ from verification.problem.tables import ProblemError, unreadable
 from verification.spreadsheet import as_csv
 
 if TYPE_CHECKING:
+    from verification.algorithm.history import History
+    from verification.algorithm.monolithic import Solution
     from verification.comparison import Comparison
     from verification.figures import Figure
-    from verification.history import History
     from verification.ledger import Ledger
-    from verification.monolithic import Solution
     from verification.reproduce import Reproduction
 
 

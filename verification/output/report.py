@@ -11,7 +11,7 @@ from ndtheory import __version__
 from ndtheory.texts import printable
 from verification.comparison import Comparison
 from verification.ledger.record import on_the_printed_proof
-from verification.sections.parts import Table, shown
+from verification.show.parts import Table, shown
 
 GLOSSARY = {
     "Neumann body": "The body that gets the linear problem of step I: the contact forces are a load on it. The other "

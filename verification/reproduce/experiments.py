@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from verification.algorithm.monolithic import SolveError, solve
 from verification.document import Document
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
-from verification.monolithic import SolveError, solve
+from verification.machine.progress import Progress, silent
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
-from verification.progress import Progress, silent
 from verification.reproduce.claims import (
     CLAIMS,
     PRINTED_THETA,

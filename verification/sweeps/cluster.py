@@ -12,7 +12,7 @@ from typing import Any
 
 from verification.extras import require
 from verification.interface.pair import ContactPair
-from verification.interrupts import undisturbed
+from verification.machine.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.row import Row, lost

@@ -23,6 +23,7 @@ from verification.algorithm.ending import NO_FORCE, PATIENCE, RUNAWAY, Ending, O
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, at_solution, linearised_rate
+from verification.algorithm.monolithic import SolveError
 from verification.algorithm.rates import Noise, rate_of
 from verification.algorithm.relaxation import Constant, Relaxation, Rule, Step
 from verification.algorithm.start import Start, begin_at, compared_with
@@ -30,7 +31,6 @@ from verification.algorithm.theta import Choice
 from verification.contact import ContactError
 from verification.contact.active_set import SLACK, Pattern, Systems
 from verification.interface.pair import ContactPair
-from verification.monolithic import SolveError
 
 #: The bound of the test of Section 6.3.
 PAPER = 1e-9

@@ -13,17 +13,17 @@ from typing import Any
 from ndtheory import HypothesisError
 from ndtheory.energy_norms import one_minus_square
 from ndtheory.texts import clean, printable
+from verification.algorithm.monolithic import SolveError
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.theta import Choice, begin
 from verification.constants import Measured, measure
 from verification.contact import ContactError
 from verification.interface.interface import Law
 from verification.interface.pair import ContactPair, pair_from
-from verification.monolithic import SolveError
+from verification.machine.threads import one_thread
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.course import KnownPieces, course
-from verification.threads import one_thread
 
 Row = dict[str, Any]
 

@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 from ndtheory import __version__
 from verification.document import Document
 from verification.interface.pair import UNITS, ContactPair
-from verification.interrupts import undisturbed
+from verification.machine.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.grid import SweepGrid

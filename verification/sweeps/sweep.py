@@ -14,9 +14,9 @@ from ndtheory import __version__
 from verification.document import Document
 from verification.interface.files import read_interface
 from verification.interface.pair import UNITS, ContactPair
+from verification.machine.progress import Progress, silent
 from verification.problem.files import load
 from verification.problem.specification import Problem
-from verification.progress import Progress, silent
 from verification.spreadsheet import as_csv
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import FAILED, Row

@@ -16,7 +16,7 @@ from typing import Any
 from fem1d2d import mesh_files
 from ndtheory import __version__
 from verification.interface.pair import ContactPair
-from verification.interrupts import CAN_WAIT, begin_child, undisturbed
+from verification.machine.interrupts import CAN_WAIT, begin_child, undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.row import Row, SharedBodies, row

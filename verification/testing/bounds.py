@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from fem1d2d.mesh import Floats
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.bounds.bound import Bound, BoundResult, Subject
-from verification.bounds.pattern_search import largest_factor
 from verification.constants import measure
 from verification.interface.build import build
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
+from verification.semidefinite.pattern_search import largest_factor
 from verification.testing.properties import Fails, Finding, Kit, Report, over
 from verification.testing.strategies import SEEDS, bar_problems, forces, matrix_pairs, plane_problems
 from verification.testing.transforms import problem_in_units, problem_mirrored

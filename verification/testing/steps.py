@@ -15,10 +15,10 @@ from fem1d2d.mesh import Floats
 from ndtheory import evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.theta import below_one
-from verification.bounds.multipliers import QuadraticForms
 from verification.constants import Measured, measure
 from verification.interface.build import build
 from verification.interface.pair import ContactPair
+from verification.semidefinite.multipliers import QuadraticForms
 from verification.testing.properties import Fails, Finding, Kit, Report
 from verification.testing.strategies import forces
 

@@ -12,7 +12,7 @@ import numpy as np
 import verification as vf
 from builder.scenes import axis, chart, crosses, dots, line, note, scene, slider, widget
 from ndtheory import energy_norms
-from verification.bounds.multipliers import QuadraticForms
+from verification.semidefinite.multipliers import QuadraticForms
 from verification.sweeps.row import Row
 
 LABEL = (

@@ -8,7 +8,7 @@ from ledger_calls import EXACT, READ, STATEMENTS
 
 from ndtheory.statements import proof_of
 from verification import ledger
-from verification.bounds import losses
+from verification.semidefinite import losses
 
 
 @pytest.fixture

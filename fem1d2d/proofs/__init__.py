@@ -1,0 +1,1 @@
+"""Proofs about matrices of bodies: bounds of their exact entries, Schur complements and eigenvalues."""

@@ -1,0 +1,1 @@
+"""The theorem in energy norms for two rectangles, without a mesh."""

@@ -1,0 +1,177 @@
+"""Logs of runs that were not relaxed by a constant factor: what Aitken's factors show of the spectrum.
+
+Aitken's factor after the residuals r and r' of two steps is ``<r, z r>/|z r|^2`` with ``z = 1 + H`` where a step is
+linear, H having the eigenvalues lambda.  Where H is selfadjoint in the inner product, its inverse is a mean of
+``1 + lambda``, and lies between the ends of the spectrum.  A code mostly has the Euclidean inner product, in which H is
+nearly selfadjoint.  Nothing is proved: an end that no residual has in it does not show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from verification.coupling.log_files import Log
+from verification.coupling.readings import LARGEST_TO_PASTE, SHOWS_MOST, NextRun, few, rounded_down
+from verification.coupling.spectrum import MARGIN, Spectrum
+from verification.value import to_plain
+
+#: A factor counts as long as the residual is above this share of the largest: the solvers' own accuracy is below it.
+NOISE = 1e-8
+
+#: The ends are read where the residual has fallen to this share, or so many factors count.  In 90 runs of 30 linear
+#: couplings theta was within 1.4 times the fewest steps in all with six factors, and with four in 80; two of these were
+#: too large, of runs that had hardly fallen.
+FALLEN, ENOUGH = 1e-2, 6
+
+#: 1 over a factor is below 1 by more than this only where contact changes, or the coupling is not linear or symmetric.
+BELOW = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenFactors:
+    """Ends of the spectrum by Aitken's factors.
+
+    Attributes
+    ----------
+    used, given : int
+        Number of factors from which the ends are read, and of all.
+    low, high : float
+        The least and the largest lambda that they show: estimates from inside the spectrum.
+    fastest_fall : float
+        The last residual over the largest one, in the window where that is least.
+    doubt : str
+        Why no theta follows from them; empty where one does.
+    """
+
+    used: int
+    given: int
+    low: float
+    high: float
+    fastest_fall: float
+    doubt: str
+
+    @property
+    def says(self) -> str:
+        """The ends in words."""
+        ends = f"factors, {self.used} of {self.given}: lambda from {few(self.low)} to {few(self.high)}"
+        return f"{ends} or beyond, estimates{'; ' * bool(self.doubt)}{self.doubt}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``accelerated.factors``."""
+        return vars(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Accelerated:
+    """A log of a run with Aitken, quasi-Newton or another rule that is not constant relaxation.
+
+    Attributes
+    ----------
+    file, form, accelerator : str
+        The accelerator as the log names it.
+    windows, iterations : int
+        Number of time windows, and the median of their iterations.
+    factors : SeenFactors or None
+        None where the log prints no Aitken factors.
+    notes : tuple of str
+    """
+
+    file: str
+    form: str
+    accelerator: str
+    windows: int
+    iterations: int
+    factors: SeenFactors | None
+    notes: tuple[str, ...]
+
+    @property
+    def counted(self) -> str:
+        """The number of iterations, in words."""
+        return f"{self.iterations} iterations" + f", the median of {self.windows} windows" * (self.windows > 1)
+
+    @property
+    def says(self) -> str:
+        """Iterations and ends in words."""
+        shown = "its residuals say nothing about rho" if self.factors is None else self.factors.says
+        return f"{self.counted}; {shown}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``accelerated``."""
+        reason = {} if self.factors is not None else {"factors": "the log prints no Aitken factor for each iteration"}
+        names = ("file", "form", "accelerator", "windows", "iterations", "factors", "says")
+        plain = {name: to_plain(getattr(self, name)) for name in names}
+        return {**plain, "notes": list(self.notes), "reason": reason}
+
+
+def seen_accelerated(log: Log) -> Accelerated:
+    """A log whose relaxation was not constant, as it was seen."""
+    assert log.accelerator is not None
+    counts = log.counts or [len(window) for window in log.columns[0].windows]
+    aitken = "aitken" in log.accelerator.lower()
+    return Accelerated(
+        file=str(log.path),
+        form=log.form,
+        accelerator=log.accelerator,
+        windows=len(counts),
+        iterations=int(np.median(counts)),
+        factors=seen_factors(log) if aitken and log.factors else None,
+        notes=log.notes,
+    )
+
+
+def seen_factors(log: Log) -> SeenFactors | None:
+    """The ends that the factors of a log show; None where no factor counts."""
+    column, inverse, given, fall = log.columns[0], [], 0, 1.0
+    for residuals, factors in zip(column.windows, log.factors, strict=False):
+        given += int(np.isfinite(factors).sum())
+        finite = residuals[np.isfinite(residuals) & (residuals > 0)]
+        if not finite.size:
+            continue
+        fall = min(fall, float(finite[-1] / finite.max()))
+        least = max(NOISE * float(finite.max()), 100 * column.decimals)
+        for i in range(1, len(factors)):  # the first one is the user's
+            if not np.isfinite(factors[i]) or factors[i] == 0 or not min(residuals[i - 1 : i + 1]) >= least:
+                continue
+            inverse.append(1 / float(factors[i]))
+    if not inverse:
+        return None
+    found, doubt = np.array(inverse), ""
+    if found.min() < 1 - BELOW:
+        doubt = "factors above 1 or below 0: contact changes, or the solvers are not accurate enough"
+    elif fall > FALLEN and len(found) < ENOUGH:
+        doubt = f"needed a residual that falls to {FALLEN:g} of its largest, or {ENOUGH} factors"
+    return SeenFactors(
+        used=len(found),
+        given=given,
+        low=max(float(found.min()) - 1, 0.0),
+        high=max(float(found.max()) - 1, 0.0),
+        fastest_fall=fall,
+        doubt=doubt,
+    )
+
+
+def spectrum_of(logs: Iterable[Accelerated]) -> Spectrum | None:
+    """The spectrum between the ends that the factors of all logs show, MARGIN added; None where each has a doubt."""
+    known = [log.factors for log in logs if log.factors is not None and not log.factors.doubt]
+    if not known:
+        return None
+    low, high = min(found.low for found in known), max(found.high for found in known)
+    return Spectrum.between(low, high + MARGIN * (1 + high))
+
+
+def after_accelerated(spectrum: Spectrum | None, tied: bool) -> NextRun:
+    """The theta to paste of a tied interface, or the run with constant relaxation that shows more."""
+    if spectrum is None:
+        why = f"{SHOWS_MOST}. Or save some iterates of the run as it is, and type ndtheory advise vectors"
+        return NextRun(theta=1.0, why=why)
+    theta = rounded_down(min(Fraction(spectrum.theta), LARGEST_TO_PASTE))
+    ends = f"2/(2 + least + largest) with lambda from {few(spectrum.low)} to {few(spectrum.high)} by Aitken's factors"
+    if tied:
+        return NextRun(theta=theta, why=f"{ends}, the largest with {100 * MARGIN:g} % added: an estimate")
+    why = f"{ends}, an estimate for one contact pattern; its log, with constant relaxation, shows whether it holds"
+    return NextRun(theta=theta, why=why)

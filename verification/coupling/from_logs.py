@@ -1,0 +1,427 @@
+"""Advice from the convergence logs of other runs: readings of each log, and bounds of rho from all of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from ndtheory import HypothesisError
+from ndtheory.constants import SMALLEST, take
+from ndtheory.energy_norms import predicted_rate, predicted_theta
+from ndtheory.number import below
+from verification.coupling import ends
+from verification.coupling.accelerated import after_accelerated, seen_accelerated, spectrum_of
+from verification.coupling.ends import DEAR, SETTLED, Box
+from verification.coupling.from_runs import advice_of_runs
+from verification.coupling.from_vectors import advice_on
+from verification.coupling.log_files import Log, read_log
+from verification.coupling.pace import CONVERGED, RELATIVE, Pace
+from verification.coupling.readings import (
+    LARGEST_TO_PASTE,
+    SHORTEST_STEP,
+    NextRun,
+    Observed,
+    RunReading,
+    assumed,
+    few,
+    kept,
+    level,
+    pasted_or_not,
+    read_observed,
+    read_plateau,
+    rounded_down,
+    steps_needed,
+)
+from verification.coupling.roles import Advice
+from verification.coupling.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
+from verification.coupling.seen import AGREE, LogBound, RhoInterval, SeenColumn, SeenLog, bounds, seen_column
+from verification.coupling.spectrum import Spectrum
+from verification.interface.pair import UNITS
+from verification.problem.tables import ProblemError
+
+#: Readings that are left, the run to make next, and rho where the logs decide it.
+Decision = tuple[tuple[RunReading, ...], NextRun, Fraction | None]
+
+#: Where the bounds of rho differ by less, a theta between costs a few steps at most.
+NARROW = Fraction(5, 4)
+
+#: What a log without its factor may be of.
+UNNAMED = (
+    "of a run with Aitken give the vectors instead, ndtheory advise vectors, or a log with its factors; "
+    "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
+)
+
+#: A window too short to be read does not converge where it has FEW steps, and its last residual is this share of the
+#: largest one.
+LARGE, FEW = 0.9, 5
+
+#: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
+SMALLEST_THETA = Fraction(1, 10**6)
+
+
+def advise_logs(
+    logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, friction: bool = False, pattern: str | None = None
+) -> Advice:
+    """Advice from the convergence logs of runs of any code, with a constant theta or with Aitken.
+
+    A log whose residual changes by a steady ratio r a step is read as
+    :func:`verification.coupling.from_runs.advise_run` reads r.  A residual that stays at a level belongs to a run that
+    does not converge; a *relative* residual ``|T g - g|/|T g|`` that stays at P > 1 to a tied run that diverges with
+    ``rho = 1/(P - 1)``.  A residual that is neither steady nor at a level shows nothing.
+
+    Without friction, or tied, ``rho >= (1 + r)/theta - 1`` wherever ``r > 1 - theta``, and ``rho >= 2/theta - 1`` if a
+    run does not converge.  If near the solution all of Gamma_c is closed and nothing slides, a run that converges also
+    has ``rho <= (1 + r)/theta - 1``.  Logs whose bounds exclude each other are reported as contradictory.
+    With friction no theta is pasted; :mod:`verification.coupling.runs_with_friction` has the bounds that are proved
+    then.
+
+    The theta to paste is predicted to take at most 1.4 times the fewest steps wherever the smallest and the largest
+    eigenvalue may lie by the logs (:mod:`verification.coupling.ends`); in contact it is not above the theta of a run
+    that converged.  Where a single log decides rho, the smallest eigenvalue is taken to be at most half of the largest.
+    The prediction is for couplings of about five modes and more: one or two modes may need fewer steps.
+
+    A log that prints the factor of Aitken for each iteration shows both ends of the spectrum, as estimates
+    (:mod:`verification.coupling.accelerated`), and with ``tied`` they decide theta where no log with constant theta
+    does. Logs of quasi-Newton runs show only how many iterations they took.
+
+    The run to make next has a theta that no log has, unless its reason begins with "keep it" or "the same again".
+
+    Parameters
+    ----------
+    logs : iterable of tuple
+        Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1; None
+        where the log names its factor, or the relaxation was not constant.
+    tied : bool
+        True if the interface is tied, so that nothing opens or slips.  A run is linear then, and the softest or the
+        stiffest mode sets its steady ratio: two logs mostly show both, and so the best theta,
+        ``2/(2 + lambda_min + rho)``.
+    friction : bool
+        True if there is friction.  Otherwise the advice assumes that there is none, or that the interface is tied.
+    pattern : str, optional
+        A regular expression for logs of another form: its one group is a residual, or its groups are named
+        ``residual``, ``iteration``, ``theta`` and ``omega``, a factor of Aitken.
+
+    Returns
+    -------
+    Advice
+        With a role, and a theta to paste, only where the logs decide; else ``next`` is the run to make.
+
+    Raises
+    ------
+    ProblemError
+        A log that cannot be read.
+    HypothesisError
+        A theta outside its range, or none for a log that names none.
+    ValueError
+        No log, friction of a tied interface, or a pattern that is none.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     log = Path(folder) / "residuals.txt"
+    ...     _ = log.write_text("".join(f"{0.8**n:.8e}\\n" for n in range(40)), encoding="utf-8")
+    ...     found = advise_logs([(log, "0.45")])
+    >>> [reading.kind for reading in found.readings], round(found.best.rho.value, 6)
+    (['mode-high'], 3.0)
+    """
+    needed = "the theta of a log, 0 < theta <= 1 (1e-6 or more)"
+    allowed = lambda value: max(SMALLEST, SMALLEST_THETA) <= value <= 1
+    number = lambda theta: None if theta is None else take("theta", theta, needed, allowed)
+    given = [(Path(path), number(theta)) for path, theta in logs]
+    if not given:
+        raise ValueError("needed one log or more")
+    assumes = assumed(tied, friction)
+    read = [(read_log(path, pattern), theta) for path, theta in given]
+    accelerated = tuple(seen_accelerated(log) for log, _ in read if log.accelerator is not None)
+    seen = tuple(seen_log(log, _theta_of(log, theta), friction) for log, theta in read if log.accelerator is None)
+    spectrum = spectrum_of(accelerated)
+    known: dict[str, Any] = {"assumes": assumes, "accelerated": accelerated}
+    if not seen:
+        known |= {"interval": interval_of([], []), "next": after_accelerated(spectrum, tied)}
+        return _of_factors(spectrum if tied else None, tied=tied, **known)
+    interval = interval_of(*(([], []) if friction else bounds(seen)))
+    readings, following, rho = with_friction(seen) if friction else decide(seen, interval, tied)
+    found = advice_of_runs(
+        [log.made for log in seen],
+        readings,
+        following,
+        rho,
+        tied=tied,
+        friction_bounds=friction_bounds(*by_kind(seen)) if friction else None,
+        logs=seen,
+        interval=interval,
+        **known,
+    )
+    if found.roles or not tied or spectrum is None or interval.contradiction is not None:
+        return found
+    paste = pasted_or_not(after_accelerated(spectrum, tied), [log.made for log in seen])
+    if paste is None:
+        return found
+    known |= {"logs": seen, "readings": found.readings, "interval": interval, "next": paste}
+    return _of_factors(spectrum, tied=tied, **known)
+
+
+def _of_factors(spectrum: Spectrum | None, *, tied: bool, **known: Any) -> Advice:
+    """The advice on what Aitken's factors show; only a run to make where that is None."""
+    if spectrum is None:
+        return Advice(neumann_body=None, roles=(), units=UNITS, tied=tied, **known)
+    return advice_on(spectrum, tied=tied, of="Aitken's factors", **known)
+
+
+def _theta_of(log: Log, theta: Fraction | None) -> Fraction:
+    """The theta that was given for a log, or that it names in all its digits."""
+    if theta is not None:
+        return theta
+    if log.theta is None or log.theta_rounding > 1e-3 * log.theta:
+        raise HypothesisError("theta", None, f"the relaxation factor of {log.path}, which does not name it ({UNNAMED})")
+    return Fraction(repr(log.theta))
+
+
+def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
+    """One log as it was seen, with its readings."""
+    off = max(log.theta_rounding, 1e-3 * float(theta))
+    if log.theta is not None and abs(log.theta - float(theta)) > off * (1 + 1e-9):
+        named = f"the log names a relaxation factor of {log.theta:g}: needed the same theta, received {float(theta):g}"
+        raise ProblemError(str(log.path), "", None, named)
+    columns = tuple(seen_column(column, theta) for column in log.columns)
+    bare = SeenLog(
+        file=str(log.path),
+        form=log.form,
+        theta=theta,
+        columns=columns,
+        readings=(),
+        next=longer(columns, theta),
+        rho=None,
+        notes=log.notes,
+    )
+    ratio, plateau, rho = bare.slowest, bare.plateau, None
+    grows = ratio is not None and ratio.least > 1
+    if ratio is not None and grows:
+        readings, following, _ = read_observed(theta, ratio)
+        if plateau is not None and one_mode(theta, ratio, plateau):
+            also = [reading for reading in read_plateau(theta, plateau)[0] if reading.kind == "plateau"]
+            readings = (*readings[:1], *also, *readings[1:])
+    elif plateau is not None:
+        readings, following = read_plateau(theta, plateau)
+        if (other := bare.rho_elsewise) is not None:
+            words = f"; if these data are not relaxed, rho is {few(other)}"
+            readings = tuple(replace(one, says=one.says + words * (one.kind == "plateau")) for one in readings)
+    elif bare.stays:
+        readings, following, _ = read_observed(theta, Observed.known(Fraction(1)))
+        if all(column.residual in RELATIVE for column in columns if column.count("level")):
+            readings = (level(theta),)  # of a relative residual also a run that grows
+    elif ratio is not None:
+        readings, following, rho = read_observed(theta, ratio)
+        if not bare.converges and all(reading.kind != "level" for reading in readings):
+            readings, rho = (*readings, level(theta, bounds=False)), None
+    else:
+        return bare if bare.pooled is None else replace(bare, next=of_pooled(theta, bare.pooled))
+    if friction:
+        readings, rho = readings_with_friction(readings), None
+    return replace(bare, readings=readings, next=following, rho=rho)
+
+
+def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
+    """The run to make where the windows of a transient show no ratio one by one."""
+    why = (
+        f"windows show no ratio one by one; their second halves have a ratio of {ratio} together, which bounds nothing"
+    )
+    if ratio.most <= ends.SWIFT:
+        return kept(theta, f"{why}, and none much faster is to be found")
+    following = read_observed(theta, ratio, converges=False)[1]
+    accelerated = "of an Aitken or IQN-ILS run this says nothing: give its vectors to ndtheory advise vectors"
+    return replace(following, why=f"{why}: {following.why}; {accelerated}")
+
+
+def one_mode(theta: Fraction, ratio: Observed, plateau: Observed) -> bool:
+    """True if the growth and the plateau of a run belong to one mode, as in a tied run."""
+    low, high = 1 / (plateau.most - 1), 1 / (plateau.least - 1)
+    return (1 + ratio.least) / theta <= AGREE * (1 + high) and 1 + low <= AGREE * (1 + ratio.most) / theta
+
+
+def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
+    """The run to make where a log shows nothing steady."""
+    paces = [one for column in columns for one in column.paces]
+    if any(one.adapts for one in paces):
+        why = "the same again, constant: this residual rises and falls as with Aitken or quasi-Newton"
+        vectors = "of such a run give the vectors to ndtheory advise vectors"
+        return NextRun(theta=float(theta), why=f"{why}; {vectors}", again=True)
+    if all(one.height < CONVERGED for one in paces):
+        return kept(theta, f"{_within(paces)}, and shows no ratio")
+    if any(one.lost for one in paces):
+        why = "half of it, as the log ends in inf or nan before a ratio shows"
+        return NextRun(theta=rounded_down(theta / 2), why=why)
+    if all(one.kind == "short" and one.height > LARGE and one.steps >= FEW for one in paces):
+        why = "half of it, as the residual is about as large at the end of each window as ever"
+        return NextRun(theta=rounded_down(theta / 2), why=why)
+    steps = f"{steps_needed(theta)} steps or more in one time window"
+    again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
+    if all(one.kind == "short" for one in paces):
+        why = f"{again}: smaller limits of convergence and a larger number of iterations"
+    else:
+        why = f"{again}, until the residual falls or grows steadily; a relative one must fall below 0.1 first"
+    return NextRun(theta=float(theta), why=why, again=True)
+
+
+def _within(paces: Sequence[Pace]) -> str:
+    most = max(one.length for one in paces)
+    return f"the run converges within {most} iteration{'s' * (most > 1)}"
+
+
+def interval_of(lower: list[LogBound], upper: list[LogBound]) -> RhoInterval:
+    """The largest bound from below beside the smallest from above."""
+    lo = max(lower, key=lambda bound: bound.value, default=None)
+    hi = min(upper, key=lambda bound: bound.value, default=None)
+    contradiction = None
+    if lo is not None and hi is not None and 1 + lo.value > AGREE * (1 + hi.value):
+        one, other = (f"{bound.log.file} with theta = {few(bound.log.theta)}" for bound in (hi, lo))
+        contradiction = (
+            f"by {one} rho is at most {few(hi.value)}, by {other} at least {few(lo.value)}: there is "
+            "friction, contact changes between the runs, a theta was not constant, or they are not runs of one problem "
+            "in the same roles"
+        )
+    return RhoInterval(lo=lo, hi=hi, contradiction=contradiction)
+
+
+def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, tied: bool) -> Decision:
+    """The readings that are left, the run to make next, and rho where the logs decide."""
+    falling = [log for log in logs if log.converges]
+    rising = [log for log in logs if log.diverges]
+    if falling:
+        base = max(falling, key=lambda log: log.theta)
+    elif rising:
+        base = min(rising, key=lambda log: log.theta)
+    else:
+        base = next((log for log in logs if log.readings), logs[0])
+    if interval.contradiction is not None:
+        why = "half of the smallest theta, in one time window, with ResAbs in the log: the logs contradict each other"
+        return base.readings, NextRun(theta=_half(logs), why=why), None
+    lo, hi = interval.lo, interval.hi
+    if (swift := next((log for log in logs if log.swift), None)) is not None and base.rho is None:
+        why = f"{_within(swift.paces)}, and none much faster is to be found"
+        return swift.readings, kept(swift.theta, why), None
+    by_all = lambda: by_ends(logs, base, None if lo is None else lo.value, tied)
+    if tied and (found := by_all()) is not None:
+        return found
+    if base.rho is not None:
+        return base.readings, fastest(falling, base.rho) or robust(logs, base.next), base.rho
+    if lo is not None and hi is not None and hi.value <= NARROW * lo.value:
+        rho = max(lo.value, hi.value)  # they may overlap a little
+        best = min(predicted_theta(rho), LARGEST_TO_PASTE)
+        why = f"the best one if rho is {few(rho)}, the upper end of what the logs leave"
+        if best > SHORTEST_STEP * base.theta:
+            return base.readings, NextRun(theta=rounded_down(best), why=why), None
+        if best > base.theta:
+            why = f"close to {few(best)}, {why}, and known to converge"
+        left = f"between {few(min(lo.value, hi.value))} and {few(rho)}"
+        says = f"the logs leave rho {left} if all of Gamma_c stays closed"
+        only = RunReading(kind="mode-high", value=float(rho), lo=below(lo.value), says=says)
+        following = NextRun(theta=rounded_down(min(best, base.theta)), why=why)
+        return (only,), fastest(falling, rho) or robust(logs, following), rho
+    if (found := by_all()) is not None:
+        return found
+    if not falling and len(rising) > 1:
+        why = "a quarter of the smallest theta so far, as none converges; the log of that run narrows rho"
+        return base.readings, NextRun(theta=rounded_down(base.theta / 4), why=why), None
+    return base.readings, between(base, rising), None
+
+
+def boxes_of(log: SeenLog, tied: bool) -> list[Box]:
+    """Limits of the ends of the spectrum by a log; in contact of the modes that are left near the solution."""
+    ratio, plateau, theta = log.slowest, log.plateau, float(log.theta)
+    left: list[Sequence[Box]] = []
+    if ratio is not None and (log.converges or (tied and ratio.least > 1)):
+        left.append(ends.of_ratio(theta, float(ratio.least), float(ratio.most)))
+    if tied and log.diverges:
+        left.append(ends.of_stiffest(2 * (1 - SETTLED) / theta))
+    if tied and plateau is not None:
+        low, high = float(1 / (plateau.most - 1)), float(1 / (plateau.least - 1))
+        left.append(ends.of_stiffest(1 + low * (1 - SETTLED), 1 + high * (1 + SETTLED)))
+    return ends.common(left)
+
+
+def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, tied: bool) -> Decision | None:
+    """The same by the limits that all logs give the ends of the spectrum; None where these do not limit rho."""
+    boxes = ends.common([boxes_of(log, tied) for log in logs])
+    known, most = [float(log.theta) for log in logs], float(LARGEST_TO_PASTE)
+    if not boxes:
+        if not tied:
+            return None
+        why = "half of the smallest theta, or leave out tied: no tied interface has all of these logs"
+        return base.readings, NextRun(theta=_half(logs), why=why), None
+    if math.isinf(stiffest := max(box.b[1] for box in boxes)):
+        return None
+    theta, dear = ends.cheapest(boxes, most if tied else float(base.theta))
+    if dear <= DEAR:
+        says = f"the logs together leave one reading: {ends_in_words(boxes)}; rho is taken at its upper end"
+        only = RunReading(kind="mode-high", value=stiffest - 1, lo=None if lo is None else below(lo), says=says)
+        following = NextRun(theta=rounded_down(theta), why=cost_in_words(boxes, dear))
+        return (only,), following, Fraction(stiffest) - 1
+    rising = [float(log.theta) for log in logs if log.diverges]
+    theta = rounded_down(ends.telling(boxes, known, most if tied else min([most, *rising])))
+    unsure = f"no theta is sure to be within {DEAR:g} times the fewest steps"
+    why = f"a run there narrows rho: as long as {ends_in_words(boxes)}, {unsure}"
+    return base.readings, NextRun(theta=theta, why=why), None
+
+
+def ends_in_words(boxes: Sequence[Box]) -> str:
+    """The limits of the smallest and the largest eigenvalue, in words."""
+    within = []
+    for which, limits in (("smallest", [box.a for box in boxes]), ("largest", [box.b for box in boxes])):
+        low, high = (f"{max(z - 1, 0):.3g}" for z in (min(z for z, _ in limits), max(z for _, z in limits)))
+        within.append(f"the {which} eigenvalue is {low if low == high else f'{low} to {high}'}")
+    return " and ".join(within)
+
+
+def cost_in_words(boxes: Sequence[Box], dear: float) -> str:
+    """The reason for a theta, in words."""
+    times = (
+        "the fewest steps" if dear < 1.05 else f"at most {math.ceil(10 * dear - 1e-9) / 10:g} times the fewest steps"
+    )
+    where = f"as the logs leave them where contact does not change, with {ends.FEWEST_MODES} modes or more"
+    return f"{times} if {ends_in_words(boxes)}, {where}"
+
+
+def _half(logs: Sequence[SeenLog]) -> float:
+    """Half of the smallest theta."""
+    return rounded_down(min(log.theta for log in logs) / 2)
+
+
+def robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
+    """The theta where rho is known and the softest mode is not: at most ``2/(2 + rho)``, best where nodes are open."""
+    boxes = [box.softened() for box in ends.common([boxes_of(log, False) for log in logs])]
+    if not boxes:
+        return best
+    theta, dear = ends.cheapest(boxes, best.theta)
+    smaller = rounded_down(theta)
+    return best if smaller >= best.theta else NextRun(theta=smaller, why=cost_in_words(boxes, dear))
+
+
+def fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:
+    """The theta of a log that falls faster than is predicted of the best one for rho; None where there is none.
+
+    The prediction is for the slowest mode that there may be: a softest mode well above 0 leaves a smaller theta faster.
+    """
+    found = [(log.slowest.most, log.theta) for log in falling if log.slowest is not None]
+    ratio, theta = min(found)
+    if ratio >= predicted_rate(rho):
+        return None
+    predicted = f"{few(predicted_rate(rho))} is predicted of 2/(2 + rho) with rho = {few(rho)}"
+    return kept(theta, f"its log falls by {few(ratio)} a step or faster, where {predicted}")
+
+
+def between(base: SeenLog, rising: list[SeenLog]) -> NextRun:
+    """The next run of the log that decides most, below the thetas that do not converge."""
+    least = min((log.theta for log in rising), default=None)
+    if not base.converges or least is None or Fraction(base.next.theta) * SHORTEST_STEP <= least:
+        return base.next
+    low, high = float(base.theta), float(least)
+    if high <= low * float(SHORTEST_STEP):
+        return kept(base.theta, f"it converges and {high:.4g} does not: no larger one is worth a run")
+    theta = rounded_down((low * high) ** 0.5)
+    return NextRun(theta=theta, why=f"between {low:.4g}, which converges, and {high:.4g}, which does not")

@@ -1,0 +1,260 @@
+"""Advice from the moduli of two bodies: lower bounds of rho, and a theta where a mirror image fits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from fractions import Fraction
+from typing import Any, get_args
+
+from ndtheory import HypothesisError, Number
+from ndtheory.constants import take
+from ndtheory.energy_norms import parallel_theta, predicted_rate, predicted_theta
+from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
+from ndtheory.number import below
+from verification.coupling.from_waves import advise_waves, shown
+from verification.coupling.kinds import BodyNumber
+from verification.coupling.readings import NextRun, or_at_one, rounded_down
+from verification.coupling.roles import PROVED, Advice, Role
+from verification.coupling.seen_moduli import (
+    Corners,
+    LowerBounds,
+    ModuliRole,
+    Parallel,
+    SeenModuli,
+    StartTheta,
+    exactly,
+)
+from verification.interface.pair import UNITS
+
+#: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.
+LARGEST_YOUNG, CLOSEST = 10**24, Fraction(1, 10**12)
+
+#: Reason for a missing friction threshold beside the values that are proved for k = 0.
+NO_FRICTION = "a mirror image proves nothing of friction: the proved values are for k = 0"
+
+#: Reason for a missing theta for a tied interface.
+ONE_END = "moduli bound rho from below, and no other end of the spectrum"
+
+
+def advise_moduli(
+    *,
+    young: Any = None,
+    poisson: Any = None,
+    plane: Plane = "strain",
+    corners: Corners | None = None,
+    mirror: Collection[int] = (),
+    flat: bool = False,
+    conductivity: Sequence[Any] | None = None,
+    capacity: Sequence[Any] | None = None,
+    density: Sequence[Any] | None = None,
+    thickness: Any = None,
+    length: Any = None,
+    dt: Any = None,
+    parallel: bool = False,
+) -> Advice:
+    """Advice from the material data of two bodies, before there is a mesh: elastic, with heat, or a fluid at a wall.
+
+    For each role the advice has the bounds of rho from below that every geometry has in the continuum:
+    ``(G_c/G_n) kappa_n`` where a piece of Gamma_c may stick, ``E*_c/E*_n`` without friction, with c for the contact
+    body and n for the Neumann body; corners of 90 degrees at the ends of Gamma_c have larger ones.  In the continuum no
+    theta from ``2/(1 + bound)`` on contracts, and no larger one on matching meshes that are fine enough.  The role with
+    the smaller bound is worth trying first: two lower bounds prove no order.
+
+    A bound from below gives no theta.  There is a theta to start with only where Gamma_c is flat, the mirror image of
+    the contact body lies in the Neumann body, and wherever the contact body is held its image is held too.  Then
+    ``rho_normal <= s`` with the s of :func:`ndtheory.moduli.mirror`, in the continuum and on meshes whose mirror image
+    refines the mesh of the Neumann body, and ``theta = 2/(2 + s)`` contracts by ``s/(2 + s)`` in each step without
+    friction: the factor is ``max(1 - theta, |1 - theta (1 + rho_normal)|)``.  With friction
+    ``rho <= s lambda_max(J S_n J, S_n)``, with the reflection J.  The second factor is guessed: from a slender column,
+    whose factor exceeds any layer's, or from a layer and its ends where the Neumann body is ``flat``
+    (:func:`ndtheory.moduli.column`, :func:`ndtheory.moduli.layer`, :func:`ndtheory.moduli.end`).
+
+    Two flat plates that exchange heat have both ends of their spectrum, hence a theta to paste and its factor
+    (:func:`ndtheory.moduli.conduction`).  A fluid at a wall, the Neumann body, has a lower bound of rho, the added mass
+    of the longest wave over the wall's own mass (:func:`ndtheory.moduli.added_mass`).  Both are tied.
+
+    Parameters
+    ----------
+    young, poisson : pair of numbers
+        E and nu of bodies 1 and 2; E in one unit of stress.  One number each for a wall.
+    plane : {'strain', 'stress', '3d'}
+    corners : {'none', '1', '2', 'both'}, optional
+        The body that ends in corners of 90 degrees at the ends of Gamma_c, where that is known.
+    mirror : collection of {1, 2}
+        The bodies whose mirror image fits into the other one, with the supports.
+    flat : bool
+        True if a body into which such an image fits is at least twice as wide as high, and held along its other side.
+    conductivity, capacity, density : pair of numbers
+        Of plates 1 and 2, the capacity per volume for a step in time; density of the fluid and of the wall.
+    thickness, length, dt : number or pair of numbers
+        Thickness of the wall, or of both plates, which are thick without it; length of the wall between the lines that
+        hold it, of a tube its length and radius; step in time.  All in one set of units.
+    parallel : bool
+        True if both solvers run at once, and both fields are relaxed.
+
+    Returns
+    -------
+    Advice
+
+    Raises
+    ------
+    HypothesisError
+        Numbers out of their range, data of two kinds, or a mirror image that cannot fit with these corners.
+
+    Examples
+    --------
+    >>> found = advise_moduli(young=(70000, 20000), poisson=("0.3", "0.3"))
+    >>> found.neumann_body, [round(role.rho.value, 3) for role in found.roles], found.next.theta
+    (1, [0.514, 6.3], 0.2799)
+    >>> fits = advise_moduli(young=(70000, 20000), poisson=("0.3", "0.3"), corners="2", mirror=[2], flat=True)
+    >>> fits.best.theta_proved, fits.next.theta
+    (0.875, 0.7954)
+    >>> heat = advise_moduli(conductivity=(50, "0.5"), capacity=("3.6e6", "1.6e6"))
+    >>> heat.neumann_body, heat.theta, round(heat.best.rate_tied, 4)
+    (1, 0.963, 0.0273)
+    >>> water = advise_moduli(density=(1000, 1200), thickness="1e-3", length=("0.05", "0.005"))
+    >>> round(water.best.rho.value, 1), water.method.name
+    (85.5, 'iqn-ils')
+    """
+    waves = {"conductivity": conductivity, "capacity": capacity, "density": density, "length": length, "dt": dt}
+    given = {key: value for key, value in (waves | {"thickness": thickness}).items() if value is not None}
+    if conductivity is not None or density is not None:
+        elastic = {"plane": plane != "strain" and plane, "corners": corners, "mirror": [*mirror], "flat": flat}
+        given |= {key: value for key, value in elastic.items() if value}
+        given |= {key: value for key, value in (("young", young), ("poisson", poisson)) if value is not None}
+        return advise_waves("fluid" if conductivity is None else "heat", given, parallel=parallel)
+    for key, value in given.items():
+        raise HypothesisError(key, shown(value), f"no {key} beside young: it belongs to conductivity or density")
+    bodies = _bodies(young, poisson, plane)
+    if corners is not None and corners not in get_args(Corners):
+        raise HypothesisError("corners", corners, f"one of {', '.join(get_args(Corners))}")
+    both: tuple[BodyNumber, ...] = (1, 2)
+    fits = tuple(body for body in both if body in mirror)
+    if len(set(mirror)) != len(fits):
+        raise HypothesisError("mirror", list(mirror), "bodies 1, 2 or both")
+    for body in fits:
+        if corners == str(3 - body):
+            needed = f"a mirror image that fits: that of body {body} goes on where body {3 - body} ends in a corner"
+            raise HypothesisError("mirror", body, needed)
+    if flat and not fits:
+        raise HypothesisError("flat", flat, "a mirror image that fits (mirror)")
+    roles = _role(1, bodies, corners, fits, flat), _role(2, bodies, corners, fits, flat)
+    seen = SeenModuli(bodies=bodies, corners=corners, mirror=fits, flat=flat, roles=roles)
+    tried = seen.smaller("stick") or seen.smaller("slide")
+    if tried is None:  # no difference but what is proved of one of them
+        started = [role.neumann_body for role in roles if role.start is not None]
+        tried = started[0] if len(started) == 1 else None
+    return Advice(
+        neumann_body=tried,
+        roles=tuple(_as_role(role, seen.bounds(role)) for role in roles),
+        units=UNITS,
+        next=_next(seen, tried, parallel),
+        moduli=seen,
+        parallel=tuple(Parallel.of(r.neumann_body, seen.bounds(r).stick.value, bound=True) for r in roles * parallel),
+    )
+
+
+def _bodies(young: Sequence[Any], poisson: Sequence[Any], plane: Plane) -> tuple[Moduli, Moduli]:
+    given = {}
+    for key, pair, of in (("young", young, "E1,E2"), ("poisson", poisson, "nu1,nu2")):
+        if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
+            received = pair if isinstance(pair, str) or not hasattr(pair, "__len__") else ",".join(map(str, pair))
+            raise HypothesisError(key, received, f"two numbers {of}, of body 1 and of body 2")
+        given[key] = pair
+    needed = "numbers E > 0 (1e-24 to 1e24)"
+    E = [take("young", v, needed, lambda v: Fraction(1, LARGEST_YOUNG) <= v <= LARGEST_YOUNG) for v in given["young"]]
+    needed = "numbers with -1 < nu <= 1/2 (1e-12 from both ends, or 1/2 itself)"
+    half = Fraction(1, 2)
+    nu = [
+        take("poisson", v, needed, lambda v: v == half or -1 + CLOSEST <= v <= half - CLOSEST) for v in given["poisson"]
+    ]
+    one, two = (Moduli(young=e, poisson=n, plane=plane) for e, n in zip(E, nu, strict=True))
+    return one, two
+
+
+def _role(
+    neumann_body: BodyNumber, bodies: tuple[Moduli, Moduli], corners: Corners | None, fits: tuple[int, ...], flat: bool
+) -> ModuliRole:
+    contact_body = 3 - neumann_body
+    neumann, contact = bodies[neumann_body - 1], bodies[contact_body - 1]
+    patch, s = half_planes(contact, neumann), mirror(contact, neumann)
+    bounds: dict[Corners, LowerBounds] = {}
+    for name in get_args(Corners):
+        openings = _opening(contact_body, name), _opening(neumann_body, name)
+        stick, slide = end(contact, neumann, openings)[1], free_end(contact, neumann, openings)
+        bounds[name] = LowerBounds(stick=_larger(patch.high, stick), slide=_larger(patch.free, slide))
+    if contact_body not in fits or s is None:
+        why = (
+            f"body {contact_body} is incompressible and body {neumann_body} is not: no multiple of its energy is enough"
+        )
+        if contact_body not in fits:
+            why = f"needed: the mirror image of body {contact_body} fits into body {neumann_body} (--shape)"
+        return ModuliRole(neumann_body=neumann_body, corners=bounds, start=None, why_no_start=why)
+    # the angle of an image that fits is at most the Neumann body's, which may be a corner unless `corners` excludes it
+    angle = math.pi / 2 if corners is None else _opening(neumann_body, corners)
+    reflected = max(layer(neumann), end(neumann, neumann, (angle, angle))[1])
+    words = "a layer and its ends"
+    if not flat:
+        reflected, words = max(reflected, column()), "a slender column, more than any layer"
+    start = StartTheta(s=s, guess=float(s) * reflected, guessed_from=words)
+    return ModuliRole(neumann_body=neumann_body, corners=bounds, start=start)
+
+
+def _opening(body: int, corners: Corners) -> float:
+    return math.pi / 2 if corners in (str(body), "both") else math.pi
+
+
+def _larger(exact: Fraction, computed: float) -> Number:
+    """A rational bound from below as a double that is one too, or the computed one where that is larger."""
+    if computed > exact * (1 + Fraction(1, 10**12)):
+        return Number.of_float(computed)
+    bound = below(exact)
+    return Number(value=bound, lo=bound, level="exact")
+
+
+def _as_role(role: ModuliRole, bounds: LowerBounds) -> Role:
+    """The role with its bound of rho, and what is proved of it without friction."""
+    reason = {
+        "theta_predicted": "moduli bound rho from below, which predicts no theta",
+        "rate_predicted": "moduli bound rho from below, which predicts no rate",
+        "friction_threshold": NO_FRICTION if role.start else "moduli say nothing about friction",
+        "rho_min": ONE_END,
+    }
+    if role.start is None:
+        reason |= dict.fromkeys(PROVED, role.why_no_start)
+        return Role(neumann_body=role.neumann_body, rho=bounds.stick, reason=reason)
+    s = role.start.s
+    return Role(
+        neumann_body=role.neumann_body,
+        rho=bounds.stick,
+        theta_proved=float(predicted_theta(s)),
+        factor_proved=exactly(predicted_rate(s)),
+        theta_max_proved=exactly(min(2 / (1 + s), Fraction(1))),
+        reason=reason,
+    )
+
+
+def _next(seen: SeenModuli, tried: BodyNumber | None, parallel: bool) -> NextRun:
+    """The theta to start with in the role that is tried, or the run to make."""
+    role = seen.roles[0 if tried is None else tried - 1]
+    if role.start is not None and parallel:
+        theta = min(parallel_theta(Fraction(role.start.guess)), Fraction(role.start.theta_guess))
+        return NextRun(
+            theta=rounded_down(theta), why="a guess for parallel coupling, 1/(1 + rho) with the guess of rho"
+        )
+    if role.start is not None:
+        why = (
+            "with friction a guess: a run at it, with its ratio of residuals, tells more; "
+            f"without friction {role.start.theta_free:.4g} is proved, as is this one"
+        )
+        return NextRun(theta=role.start.theta_guess, why=why)
+    largest = seen.largest(role)
+    who = "either body" if tried is None else f"body {tried}"
+    where = "tied" if parallel else "without friction or tied"
+    among = "the largest bound above" if seen.corners is None else "the bound above"
+    why = (
+        f"the Neumann problem on {who}, 1/(2 + {largest:.4g}) with {among}, which contracts {where} "
+        f"if rho is below {3 + 2 * largest:.4g}; halve it if the residual does not fall{or_at_one(largest)}"
+    )
+    return NextRun(theta=rounded_down(1 / (2 + Fraction(largest))), why=why)

@@ -1,0 +1,529 @@
+"""Residuals in the convergence log of another code, by field and time window.
+
+Two kinds are read: columns of numbers, as ``precice-<participant>-convergence.log`` of preCICE, and what codes print
+line by line (:mod:`verification.coupling.log_lines`).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from verification.coupling.log_lines import Form, Residual, form_of, form_of_pattern
+from verification.machine.interrupts import in_time
+from verification.problem.tables import ProblemError, short, unreadable
+
+#: Largest log that is read; a million lines of preCICE with four fields have 80 MB.
+MOST_BYTES = 500_000_000
+
+#: Seconds of processor time for a pattern that a user gave: repeats inside repeats may take for ever.  Others take some
+#: 2 s for ten million characters.
+SECONDS, SECONDS_PER_CHARACTER = 10, 1e-6
+
+#: So many lines at both ends of a log show how many digits its numbers have.
+LOOKED_AT = 200
+
+#: Advice for a log whose relaxation was not constant.
+RUN_AGAIN = "run again with constant relaxation: where it changes, the ratios of residuals say nothing about rho"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """The residuals of one field.
+
+    Attributes
+    ----------
+    name : str
+    residual : {'absolute', 'relative', 'previous', 'drop', 'assumed'}
+        ``|T x - x|``; the same over ``|T x|``; over ``|x|``; over the first or the largest one of its window, so that
+        it has the ratios of the absolute residual; taken as absolute because nothing says otherwise.
+    windows : tuple of array
+        The residuals of each time window in their order.
+    digits, decimals : float
+        Rounding of a number relative to its size, as its digits have it; rounding of a number that is written with a
+        fixed number of decimals, else 0.
+    """
+
+    name: str
+    residual: Residual
+    windows: tuple[Floats, ...]
+    digits: float
+    decimals: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Log:
+    """A log as it was read.
+
+    Attributes
+    ----------
+    theta : float or None
+        The relaxation factor that the log itself names.
+    theta_rounding : float
+        Rounding of theta as it is written there; 0 if it has all its digits.
+    accelerator : str or None
+        The rule that the log names where it is not constant relaxation.
+    factors : tuple of array
+        Of each window, the factor of the relaxation after each residual of the first column, nan where none is named.
+    counts : tuple of int
+        Iterations of each window, of a log that has no residuals.
+    notes : tuple of str
+        About lines that were left out.
+    """
+
+    path: Path
+    form: str
+    columns: tuple[Column, ...]
+    theta: float | None = None
+    theta_rounding: float = 0.0
+    accelerator: str | None = None
+    factors: tuple[Floats, ...] = ()
+    counts: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def read_log(path: Path, pattern: str | None = None) -> Log:
+    """Read the residuals in a log, by its form or by a regular expression.
+
+    Raises
+    ------
+    ProblemError
+        No such log, or one that is damaged other than in its last line.
+    ValueError
+        A pattern that is none (:func:`verification.coupling.log_lines.form_of_pattern`).
+    """
+    form = None if pattern is None else form_of_pattern(pattern)
+    why = unreadable(path, MOST_BYTES)
+    if why:
+        raise _refused(path, why)
+    text = _ANSI.sub("", _text(path))
+    if not text.strip():
+        raise _refused(path, "needed residuals, this file is empty")
+    seconds = int(SECONDS + SECONDS_PER_CHARACTER * len(text))
+    form = form or form_of(text)
+    try:
+        with in_time(seconds) if pattern is not None else nullcontext():
+            log = _LogTable(path, text).log() if form is None else _read_lines(path, text, form)
+    except TimeoutError:
+        needed = f"searching it takes more than {seconds} s of processor time: needed no repeats inside repeats"
+        raise _refused(path, f"{needed} (--pattern)") from None
+    if not any(np.isfinite(window).any() for column in log.columns for window in column.windows):
+        if not log.columns:
+            return log
+        raise _refused(path, "needed residuals, every number of its columns is inf or nan")
+    return replace(log, accelerator=log.accelerator or _quasi_newton_beside(path))
+
+
+def _refused(path: Path, needed: str, line: int = 0, received: str | None = None) -> ProblemError:
+    given = "" if received is None else f"received {short(received, 40)!r}, "
+    return ProblemError(f"{path}, line {line}" if line else str(path), "", None, given + needed)
+
+
+def _text(path: Path) -> str:
+    """The text of a file in whichever encoding; lines end with one line feed."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise _refused(path, f"cannot be read: {error.strerror}") from None
+    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if not wide and b"\0" in data:
+        raise _refused(path, "needed a log as text, this file is binary")
+    try:
+        text = data.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")  # numbers are the same in each of its relatives
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _quasi_newton_beside(path: Path) -> str | None:
+    """The name of the rule if the log of iteration counts of preCICE beside a log has quasi-Newton columns."""
+    beside = path.with_name(path.name.replace("-convergence.log", "-iterations.log"))
+    if beside == path or unreadable(beside, MOST_BYTES):
+        return None
+    names, *lines = (line.split() for line in _text(beside).split("\n"))
+    if "QNColumns" not in names:
+        return None
+    i = names.index("QNColumns")
+    counts = [int(words[i]) for words in lines if len(words) == len(names) and words[i].isdigit()]
+    return _quasi_newton(max(counts, default=0))
+
+
+def _quasi_newton(columns: int) -> str | None:
+    return f"quasi-Newton, up to {columns} columns" if columns else None
+
+
+def _number(word: str) -> float:
+    """A number as C, Fortran or Python writes it."""
+    try:
+        return float(word)
+    except ValueError:
+        plain = word.lower()
+        if plain.lstrip("+-").startswith(("nan", "1.#ind", "1.#qnan")):
+            return math.nan
+        if plain.lstrip("+-").startswith("1.#inf"):
+            return math.inf
+        return float(plain.replace("d", "e"))
+
+
+def _rounding(words: Sequence[str]) -> dict[str, float]:
+    """Rounding of numbers as they are written, in the attributes of :class:`Column`.
+
+    >>> _rounding(["1.234e-05", "1.2e-06"]), _rounding(["0.0012", "0.2"])
+    ({'digits': 0.0005, 'decimals': 0.0}, {'digits': 0.0, 'decimals': 5e-05})
+    """
+    numbers = [word.lower().replace("d", "e").partition("e") for word in words if "n" not in word.lower()]
+    decimals = [len(figures.partition(".")[2]) for figures, _, _ in numbers]
+    scientific = [places for places, (_, exponent, _) in zip(decimals, numbers, strict=True) if exponent]
+    if scientific:
+        return {"digits": 0.5 * 10.0 ** -max(scientific), "decimals": 0.0}
+    return {"digits": 0.0, "decimals": 0.5 * 10.0 ** -max(decimals, default=0)}
+
+
+# --- lines ------------------------------------------------------------------------------------------------------------
+
+_ANSI = re.compile(r"\x1b\[[0-9;]*m")
+
+
+def _read_lines(path: Path, text: str, form: Form) -> Log:
+    """The residuals that a code prints line by line.
+
+    With an ``echo_level`` below 4 accelerators of Kratos do not name themselves, and any is taken for constant
+    relaxation.
+    """
+    other = None if form.accelerator is None else form.accelerator.search(text)
+    found = _Lines(path)
+    for line, match in _matches(text, form):
+        found.add(line, match)
+    if not found.windows:
+        raise _refused(path, form.needed)
+    first = next(iter(found.windows.values()))
+    windows = {name: _last_of(series) if form.again else series for name, series in found.windows.items()}
+    factors = () if form.again else found.aligned([len(window) for window in first])
+    accelerator = None if other is None else other[1]
+    values = found.factors
+    if accelerator is None and form.every_step and len(values) + len(first) < sum(map(len, first)):
+        accelerator = "quasi-Newton"  # which prints no factor
+    if accelerator is None and len(set(values)) > 1:
+        if not found.omega:
+            some = ", ".join(sorted(set(values))[:2])
+            raise _refused(path, f"the relaxation factor takes {len(set(values))} values, as {some}: {RUN_AGAIN}")
+        accelerator = "Aitken"
+    columns = tuple(
+        Column(
+            name=form.label.format(name),
+            residual=form.residual,
+            windows=tuple(map(np.array, series)),
+            **_rounding(found.written[name][:LOOKED_AT]),
+        )
+        for name, series in windows.items()
+    )
+    if accelerator is not None or not values:
+        return Log(path=path, form=form.name, columns=columns, accelerator=accelerator, factors=factors)
+    theta, rounding = _number(values[0]), _rounding(values[:1])
+    off = (rounding["digits"] * theta + rounding["decimals"]) * form.rounded
+    return Log(path=path, form=form.name, columns=columns, theta=theta, theta_rounding=off)
+
+
+class _Lines:
+    """Residuals by field and window, and factors, as lines are read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.windows: dict[str, list[list[float]]] = {}
+        self.written: dict[str, list[str]] = {}
+        self.factors: list[str] = []  # Kratos 10 writes one figure of a constant one
+        self.omega = False
+        self.after: list[dict[int, list[float]]] = [{}]  # of each window, by the number of residuals before
+        self.field, self.before = "residual", 0
+        self.fresh: set[str] = set()  # fields that have begun the window
+
+    def add(self, line: int, match: re.Match[str]) -> None:
+        """Take what a match has: the factor last, as it comes after the residual."""
+        found = match.groupdict() or {"residual": match[1]}
+        if found.get("iteration"):
+            iteration = int(self._value(line, found["iteration"]))
+            if self.fresh and iteration <= self.before:
+                self.fresh.clear()
+                self.after.append({})
+            self.before = iteration
+        if found.get("field"):
+            self.field = found["field"].strip()
+        if word := found.get("residual"):
+            value = self._value(line, word)
+            if value < 0:
+                raise _refused(self.path, "needed a residual >= 0", line, word)
+            if self.field not in self.fresh:
+                self.fresh.add(self.field)
+                self.windows.setdefault(self.field, []).append([])
+            self.windows[self.field][-1].append(value)
+            self.written.setdefault(self.field, []).append(word)
+        for name in ("theta", "omega"):
+            if word := found.get(name):
+                self.omega = self.omega or name == "omega"
+                self.factors.append(word)
+                self.after[-1].setdefault(self._steps, []).append(self._value(line, word))
+
+    @property
+    def _steps(self) -> int:
+        """Number of residuals of the first field in this window."""
+        first = next(iter(self.windows), None)
+        return len(self.windows[first][-1]) if first in self.fresh and first is not None else 0
+
+    def _value(self, line: int, word: str) -> float:
+        try:
+            return _number(word)
+        except ValueError:
+            raise _refused(self.path, "needed a number", line, word) from None
+
+    def aligned(self, lengths: Sequence[int]) -> tuple[Floats, ...]:
+        """The factor after each residual, nan where there is none; nothing where an iteration has several."""
+        if any(len(values) > 1 for window in self.after for values in window.values()) or not self.factors:
+            return ()
+        pairs = zip(lengths, self.after, strict=False)  # a last window may have no residual yet
+        return tuple(np.array([after.get(n + 1, [math.nan])[0] for n in range(length)]) for length, after in pairs)
+
+
+def _last_of(blocks: list[list[float]]) -> list[list[float]]:
+    """Blocks without those that the next one repeats and continues."""
+    pairs = zip(blocks, [*blocks[1:], []], strict=True)
+    return [block for block, after in pairs if after[: len(block)] != block]
+
+
+def _matches(text: str, form: Form) -> Iterator[tuple[int, re.Match[str]]]:
+    for line, content in enumerate(StringIO(text), 1):
+        if not form.words or any(word in content for word in form.words):  # the others are many, and searched slowly
+            for match in form.line.finditer(content):
+                yield line, match
+
+
+# --- columns of numbers -----------------------------------------------------------------------------------------------
+
+_COMMENT = ("#", "%", "!", "//")
+_PRECICE = re.compile(r"Res(\w*)\(.+\)")
+_RESIDUAL = re.compile(r"res|norm|err|abs|rel|drop")
+_WINDOWS = {"timewindow", "window", "timestep", "time", "increment", "loadstep"}
+_ITERATIONS = {"iteration", "iter", "it", "couplingiteration", "k", "n", "step"}
+_THETAS = {"theta", "omega", "relaxation", "relaxationfactor", "alpha"}
+_OTHERS = {"convergence", "converged", "totaliterations", "limit", "tolerance", "tol", "abstol", "reltol"}
+
+
+def _kind(name: str) -> Residual:
+    """The residual that a column holds, by its name; of preCICE all are relative but ``ResAbs`` and ``ResDrop``."""
+    precice = _PRECICE.fullmatch(name)
+    word = (precice[1] if precice else name).lower()
+    if precice:
+        return "absolute" if word == "abs" else "drop" if word == "drop" else "relative"
+    if "drop" in word or "initial" in word:
+        return "drop"
+    return "relative" if "rel" in word else "absolute" if "abs" in word else "assumed"
+
+
+class _LogTable:
+    """Columns of numbers, with names in their first line or without: of preCICE, and plain ones."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self.path = path
+        self.lines = text.rstrip().split("\n")
+        self.complete = text.endswith("\n")
+        self.notes: list[str] = []
+        self.names: list[str] | None = None
+        self.comment = ""  # the last one before the numbers
+        self.again: list[int] = []  # rows at which the names were written once more
+        self.numbers: list[int] = []  # the line of each row
+        self.separator = self._separator()
+
+    def _separator(self) -> str | None:
+        """The sign between numbers: a semicolon, a comma, or None for space."""
+        for line in self.lines:
+            try:
+                for word in re.split(r"[;,\s]+", line.strip().strip(";,")):
+                    _number(word)
+            except ValueError:
+                continue
+            return ";" if ";" in line else "," if "," in line else None
+        return None
+
+    def _split(self, line: str) -> list[str]:
+        if self.separator is None:
+            return line.split()
+        words = line.replace(",", ".").split(";") if self.separator == ";" else line.split(",")
+        words = [word.strip() for word in words]
+        return words[:-1] if words and not words[-1] else words
+
+    def log(self) -> Log:
+        """The log that the table is."""
+        data = self._rows()
+        names = self.names or self._commented(data.shape[1])
+        if {"Iterations", "QNColumns"} <= set(names) and len(names) == data.shape[1]:
+            counts, modes = (data[:, names.index(name)] for name in ("Iterations", "QNColumns"))
+            if modes.max() > 0:
+                return Log(
+                    path=self.path,
+                    form="preCICE",
+                    columns=(),
+                    accelerator=_quasi_newton(int(modes.max())),
+                    counts=tuple(int(count) for count in counts),
+                )
+        iteration, window, theta, residuals = self._roles(names, data.shape[1])
+        starts = self._starts(data, iteration, window)
+        ends = self.numbers
+        if len(ends) > 2 * LOOKED_AT:
+            ends = ends[:LOOKED_AT] + ends[-LOOKED_AT:]
+        words = list(zip(*(self._split(self.lines[line - 1]) for line in ends), strict=True))
+        columns = []
+        for i in residuals:
+            wrong = np.flatnonzero(data[:, i] < 0)
+            if wrong.size:
+                received = f"{data[wrong[0], i]:g}"
+                raise _refused(self.path, f"needed a residual >= 0 in {names[i]}", self.numbers[wrong[0]], received)
+            split = tuple(np.split(data[:, i], starts))
+            columns.append(Column(name=names[i], residual=_kind(names[i]), windows=split, **_rounding(words[i])))
+        factors = None if theta is None else data[:, theta]
+        omega = theta is not None and factors is not None and "omega" in names[theta].lower()
+        changes = omega and factors is not None and bool((factors != factors[0]).any())
+        return Log(
+            path=self.path,
+            form="preCICE" if any(_PRECICE.fullmatch(name) for name in names) else "columns",
+            columns=tuple(columns),
+            theta=None if factors is None or changes else self._theta(factors),
+            accelerator="Aitken" if changes else None,
+            factors=tuple(np.split(factors, starts)) if changes and factors is not None else (),
+            notes=tuple(self.notes),
+        )
+
+    def _rows(self) -> Floats:
+        """The numbers, a row a line; the last line may be cut off."""
+        rows: list[list[float]] = []
+        width, last = 0, len(self.lines)
+        block, line = np.empty((0, 0)), 0
+        while line < last:
+            line += 1
+            words = self._split(self.lines[line - 1])
+            if not words:
+                continue
+            if words[0].startswith(_COMMENT):
+                if not self.numbers:
+                    self.comment = self.lines[line - 1].strip().lstrip("#%!/ ")
+                continue
+            row = self._row(line, words, width)
+            if row is None:
+                continue
+            wanted = width or len(self.names or row)
+            if len(row) != wanted:
+                if line == last and len(row) < width:
+                    self.notes.append(f"line {line}, the last one, is not whole and was left out")
+                    break
+                raise _refused(self.path, f"needed {wanted} numbers in a line, received {len(row)}", line)
+            if not width:
+                width = len(row)
+                block = self._block(line - 1, width)
+                if len(block):
+                    self.numbers = list(range(line, line + len(block)))
+                    line += len(block) - 1
+                    continue
+            rows.append(row)
+            self.numbers.append(line)
+        if not self.numbers:
+            raise _refused(self.path, "needed residuals, it has no line of numbers")
+        data = np.concatenate([block.reshape(-1, width), np.reshape(rows, (-1, width))])
+        if not self.complete and len(data) > 1 and self.numbers[-1] == last:
+            end, before = (self._split(self.lines[line - 1])[-1] for line in (last, self.numbers[-2]))
+            if len(end) < len(before):
+                self.notes.append(f"line {last}, the last one, may end in the midst of a number and was left out")
+                self.numbers.pop()
+                return data[:-1]
+        return data
+
+    def _block(self, start: int, width: int) -> Floats:
+        """All lines but the last one at once, which is fast; none where one of them is anything but numbers."""
+        lines, block = self.lines[start:-1], np.empty((0, width))
+        if len(lines) > 1 and self.separator != ";":
+            with suppress(ValueError):
+                block = np.loadtxt(lines, delimiter=self.separator, comments=None, ndmin=2)
+        return block if block.shape == (len(lines), width) else np.empty((0, width))
+
+    def _row(self, line: int, words: list[str], width: int) -> list[float] | None:
+        """A row that is not all plain numbers; None for a line of names or a last line that was cut off."""
+        row = []
+        for word in words:
+            try:
+                row.append(_number(word))
+            except ValueError:
+                bare = [name.strip("\"'") for name in words]
+                if self.names is None and not self.numbers:
+                    self.names = bare
+                elif bare == self.names:  # another run, written behind the first
+                    self.again.append(len(self.numbers))
+                elif line == len(self.lines) and len(words) <= (width or len(words)):
+                    self.notes.append(f"line {line}, the last one, is not whole and was left out")
+                else:
+                    raise _refused(self.path, "needed a number", line, word) from None
+                return None
+        return row
+
+    def _commented(self, width: int) -> list[str]:
+        """Names from a comment before the numbers; one column needs none."""
+        names = self._split(self.comment)
+        if len(names) == width:
+            return names
+        if width == 1:
+            return ["residual"]
+        raise _refused(self.path, f"needed a line with the names of its {width} columns above them")
+
+    def _roles(self, names: Sequence[str], width: int) -> tuple[int | None, int | None, int | None, list[int]]:
+        """The columns with the iteration, the window, the relaxation factor, and residuals."""
+        if len(names) != width:
+            needed = f"needed {len(names)} numbers, one for each name, received {width}"
+            raise _refused(self.path, needed, self.numbers[0])
+        bare = [re.sub(r"[^a-z]", "", name.lower()) for name in names]
+        if "qncolumns" in bare or {"totaliterations", "convergence"} <= set(bare):
+            needed = "this is the log of iteration counts: needed precice-<participant>-convergence.log beside it"
+            raise _refused(self.path, needed)
+        first = lambda known: next((i for i, name in enumerate(bare) if name in known), None)
+        iteration, window, theta = first(_ITERATIONS), first(_WINDOWS), first(_THETAS)
+        rest = [i for i in range(width) if i not in (iteration, window, theta) and bare[i] not in _OTHERS]
+        residuals = [i for i in rest if _RESIDUAL.search(bare[i])]
+        if not residuals and len(rest) == 1:
+            residuals = rest
+        if not residuals:
+            found = short(", ".join(names), 120)
+            raise _refused(self.path, f"columns {found}: needed one whose name has res, norm, abs or rel in it")
+        return iteration, window, theta, residuals
+
+    def _starts(self, data: Floats, iteration: int | None, window: int | None) -> list[int]:
+        """The rows at which a time window begins, without the first one."""
+        begins = np.zeros(len(data), dtype=bool)
+        begins[self.again] = True
+        if window is not None:
+            begins[1:] |= data[1:, window] != data[:-1, window]
+        if iteration is not None:
+            counts = data[:, iteration]
+            wrong = np.flatnonzero(~np.isfinite(counts))
+            if wrong.size:
+                i = wrong[0]
+                raise _refused(self.path, "needed the number of the iteration", self.numbers[i], f"{counts[i]:g}")
+            begins[1:] |= counts[1:] <= counts[:-1]
+            missing = np.flatnonzero(~begins[1:] & (counts[1:] != counts[:-1] + 1)) + 1
+            if missing.size:
+                i = missing[0]
+                needed = f"needed iteration {counts[i - 1] + 1:g}: every iteration counts"
+                raise _refused(self.path, needed, self.numbers[i], f"{counts[i]:g}")
+        begins[0] = False
+        return [int(i) for i in np.flatnonzero(begins)]
+
+    def _theta(self, values: Floats) -> float:
+        """The relaxation factor that the log itself names."""
+        changes = np.flatnonzero(values != values[0])
+        if changes.size or not math.isfinite(values[0]):
+            i = changes[0] if changes.size else 0
+            changed = f"the relaxation factor changes from {values[0]:g} to {values[i]:g}: {RUN_AGAIN}"
+            raise _refused(self.path, changed, self.numbers[i])
+        return float(values[0])

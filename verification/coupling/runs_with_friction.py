@@ -1,0 +1,177 @@
+"""Advice from runs with friction: bounds that their residuals prove, and the run to make next.
+
+With friction no ratio of residuals bounds rho.  The theorem in energy norms bounds one step by a factor q of rho,
+kappa_1 and kappa_2 together, and a mode that slides has a complex eigenvalue.  Three things are left:
+
+* Every step of T_theta is at most ``(1 - theta) + theta L`` in the norm (5.21), where L is the Lipschitz constant of T.
+  So a steady ratio r has ``L >= 1 - (1 - r)/theta``, and a run that does not converge has ``L >= 1``.  The theorem has
+  ``L <= sqrt(rho) R`` with ``R = (s + sqrt(s^2 + 4 kappa_2))/2`` and ``s = sqrt(rho) + kappa_1``.
+* Near a solution where contact does not change, each mode is multiplied by ``1 - theta z`` with a complex number z.
+  The slowest one has ``|1 - theta z| = r``, so that ``(1 - r)/theta <= |z| <= (1 + r)/theta``.
+* There the ratio is the largest of these moduli.  It is convex in theta and 1 at theta = 0.  So a smaller theta' has at
+  most ``1 - (1 - r) theta'/theta``, and lines through two known ratios bound it from below beyond both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations
+from typing import Any
+
+from ndtheory.number import above, below
+from verification.coupling.ends import DEAR, SWIFT
+from verification.coupling.readings import (
+    LARGEST_TO_PASTE,
+    SAME,
+    SHORTEST_STEP,
+    NextRun,
+    Observed,
+    RunReading,
+    few,
+    kept,
+    rounded_down,
+)
+from verification.coupling.seen import SeenLog
+
+#: So many thetas between two runs are compared.
+BETWEEN = 32
+
+_SAYS = {
+    "mode-high": "a mode that changes its sign in every step is the slowest; with friction it does not bound rho",
+    "mode-low": "a mode that keeps its sign is the slowest; with friction it does not bound rho",
+    "open": "nodes that are open set the pace, 1 - theta a step, whatever rho is",
+    "level": "contact alternates between open and closed, or stick and slip: with friction this does not bound rho",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionBounds:
+    """Bounds that runs with friction prove.
+
+    Attributes
+    ----------
+    image : float or None
+        The Lipschitz constant of T in the norm (5.21) is at least this, and so is ``sqrt(rho) R``; None where the runs
+        are too fast for a bound above 0.
+    theta, rate, eigenvalue : float or None, and tuple of float or None
+        The largest theta whose residual falls, its ratio at most, and limits of ``|1 + lambda|`` of its slowest mode;
+        None where no residual falls.
+    """
+
+    image: float | None
+    theta: float | None
+    rate: float | None
+    eigenvalue: tuple[float, float] | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``friction_bounds``."""
+        reason = {} if self.image is not None else {"image": "every run is as fast as with open nodes alone"}
+        if self.eigenvalue is None:
+            reason |= dict.fromkeys(("theta", "rate", "eigenvalue"), "no residual falls steadily")
+        modes = None if self.eigenvalue is None else dict(zip(("least", "most"), self.eigenvalue, strict=True))
+        return {**vars(self), "eigenvalue": modes, "reason": reason}
+
+
+Runs = list[tuple[Fraction, Observed]]
+Rising = list[tuple[Fraction, Observed | None]]
+
+
+def by_kind(logs: Sequence[SeenLog]) -> tuple[Runs, Rising]:
+    """theta and ratio of the logs that converge, and of those that do not: None for one that stays at a level."""
+    falling: Runs = [(log.theta, log.slowest) for log in logs if log.converges and log.slowest is not None]
+    grows = lambda log: log.slowest if log.slowest is not None and log.slowest.least > 1 else None
+    return falling, [(log.theta, grows(log)) for log in logs if log.diverges]
+
+
+def with_friction(logs: Sequence[SeenLog]) -> tuple[tuple[RunReading, ...], NextRun, None]:
+    """The readings of the log that decides most and the run to make next; logs decide no rho with friction."""
+    falling, rising = by_kind(logs)
+    if not falling and not rising:
+        return (), next((kept(log.theta, log.next.why) for log in logs if log.swift), logs[0].next), None
+    decides = max(theta for theta, _ in falling) if falling else min(theta for theta, _ in rising)
+    readings = next(log.readings for log in logs if log.theta == decides and (log.converges or log.diverges))
+    return readings, next_with_friction(falling, [theta for theta, _ in rising]), None
+
+
+def friction_bounds(
+    falling: Sequence[tuple[Fraction, Observed]], rising: Sequence[tuple[Fraction, Observed | None]]
+) -> FrictionBounds:
+    """Bounds from runs whose residual falls by a ratio, and from those that do not converge.
+
+    Both are sequences of theta and its steady ratio; None for a residual that stays at a level.
+    """
+    known = [(theta, ratio.least) for theta, ratio in (*falling, *rising) if ratio is not None]
+    image = max([1 - (1 - least) / theta for theta, least in known] + [Fraction(1)] * bool(rising), default=Fraction(0))
+    theta, ratio = max(falling, key=lambda run: run[0], default=(None, None))
+    ends = None
+    if theta is not None and ratio is not None:
+        ends = below((1 - ratio.most) / theta), above((1 + ratio.most) / theta)
+    return FrictionBounds(
+        image=below(image) if image > 0 else None,
+        theta=None if theta is None else float(theta),
+        rate=None if ratio is None else above(ratio.most),
+        eigenvalue=ends,
+    )
+
+
+def readings_with_friction(readings: Sequence[RunReading]) -> tuple[RunReading, ...]:
+    """The readings of a run without bounds of rho; a plateau needs a tied interface."""
+    return tuple(RunReading(kind=one.kind, says=_SAYS[one.kind]) for one in readings if one.kind in _SAYS)
+
+
+def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Sequence[Fraction]) -> NextRun:
+    """The run to make next, or the theta of the fastest run where no other one is much faster.
+
+    ``falling`` are theta and ratio of the runs whose residual falls, ``rising`` the thetas that do not converge; at
+    least one run of either kind is given.
+    """
+    if not falling:
+        parts = 2 if len(rising) == 1 else 4
+        share = "half" if parts == 2 else "a quarter"
+        why = f"{share} of {few(min(rising))}, which does not converge; that run shows whether it suffices"
+        return NextRun(theta=rounded_down(min(rising) / parts), why=why)
+    theta, ratio = min(falling, key=lambda run: (run[1].value, run[0]))
+    pace = f"its residual changes by {few(ratio.value)} a step"
+    if ratio.most <= SWIFT:
+        return kept(theta, f"{pace}, and none much faster is to be found")
+    made = [other for other, _ in falling] + list(rising)
+    slower = ratio.least > 1 - (1 - SAME) * theta  # than nodes that are open
+    lower = max((other for other in made if other < theta), default=theta / 4 if slower else theta)
+    upper = min((other for other in made if other > theta), default=max(theta, LARGEST_TO_PASTE))
+    low, middle, high = float(lower), float(theta), float(upper)
+    points = [(0.0, 1.0, 1.0)] + [(float(at), float(r.least), float(r.most)) for at, r in falling]
+    thetas = [low + (high - low) * i / BETWEEN for i in range(BETWEEN + 1)]
+    least = min(least_rate(points, at) for at in thetas)
+    if least > 0 and math.log(least) >= DEAR * math.log(float(ratio.most)):
+        return kept(theta, f"{pace}, and between {low:.4g} and {high:.4g} none takes less than 1/{DEAR:g} of its steps")
+    if max(middle / low, high / middle) < SHORTEST_STEP:
+        return kept(theta, f"{pace}, and the runs next to it leave no room for a faster one")
+    where, end = ("smaller", low) if middle / low > high / middle else ("larger", high)
+    next_theta = math.sqrt(middle * end)
+    why = f"{where} than {middle:.4g}, the fastest so far: {pace}; that run shows whether a {where} one is faster"
+    return NextRun(theta=rounded_down(next_theta), why=why)
+
+
+def least_rate(points: Sequence[tuple[float, float, float]], theta: float) -> float:
+    """Least ratio that a theta can have by convexity, from points (theta, least and largest ratio).
+
+    Examples
+    --------
+    >>> points = [(0.0, 1.0, 1.0), (0.2, 0.8, 0.8), (0.6, 0.9, 0.9)]
+    >>> round(least_rate(points, 0.4), 12)
+    0.6
+    """
+    found = [0.0]
+    for one, other in combinations(sorted(points), 2):
+        if one[0] == other[0]:
+            continue
+        if other[0] <= theta:  # the line through the ends that make it lowest
+            (a, _, high), (b, low, _) = one, other
+            found.append(low + (low - high) / (b - a) * (theta - b))
+        elif one[0] >= theta:
+            (a, low, _), (b, _, high) = one, other
+            found.append(low + (high - low) / (b - a) * (theta - a))
+    return max(found)

@@ -1,0 +1,309 @@
+"""Logs of other runs as they were seen, and the bounds of rho that they give together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from ndtheory.number import above, below
+from verification.coupling.log_files import Column
+from verification.coupling.pace import MOST_WINDOWS, RELATIVE, Pace, pace, pooled, together
+from verification.coupling.readings import FEWEST_STEPS, Made, NextRun, Observed, RunReading, few, steps_needed
+from verification.value import to_plain
+
+#: A residual below this share of its largest value has fallen, although the log is too short for a ratio.
+FALLEN = 0.1
+
+#: Numbers of one run, as rho by two fields, agree within this factor.
+AGREE = Fraction(103, 100)
+
+#: Assumption under which a ratio bounds rho from below, and from above.
+FROM_BELOW = "no friction, or a tied interface"
+TIED = "a tied interface"
+FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
+
+_WHY_NOT = {
+    "ratio": "no window shows one",
+    "plateau": "no window shows one",
+    "pooled": "windows are read one by one, or are too few or too short to be pooled",
+}
+
+#: The kinds of a pace, in words.
+_WORDS = {
+    "steady": "steady",
+    "level": "at a level",
+    "floor": "at a low level",
+    "plateau": "at a plateau",
+    "unsteady": "without a steady ratio",
+    "short": "with too few steps",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenColumn:
+    """The residuals of one field of a log.
+
+    Attributes
+    ----------
+    name, residual : str
+        The kind is ``absolute``, ``relative``, ``drop``, or ``assumed``: taken as absolute.
+    paces, windows : tuple of Pace, int
+        Of the time windows that were read, and the number of all; short ones are not read where there are others, of
+        many the last ones.
+    ratio, plateau : Observed or None
+        Of the windows put together.
+    pooled : Observed or None
+        The pace of windows of which none shows a ratio, which bounds nothing.
+    """
+
+    name: str
+    residual: str
+    paces: tuple[Pace, ...]
+    windows: int
+    ratio: Observed | None
+    plateau: Observed | None
+    pooled: Observed | None = None
+
+    def count(self, *kinds: str) -> int:
+        """Number of windows that were read and are of these kinds."""
+        return sum(pace.kind in kinds for pace in self.paces)
+
+    @property
+    def says(self) -> str:
+        """The column in words."""
+        if len(self.paces) == 1:
+            found = _WORDS[self.paces[0].kind]
+        else:
+            counts = ((self.count(kind), words) for kind, words in _WORDS.items())
+            found = f"of {self.windows} windows {', '.join(f'{n} {words}' for n, words in counts if n)}"
+        if self.ratio is not None:
+            found += f"; ratio {self.ratio}"
+        if self.plateau is not None:
+            found += f"; plateau {self.plateau}"
+        if self.count("short") == len(self.paces):
+            found += f", {max(pace.steps for pace in self.paces)} steps at most"
+        if self.pooled is not None:
+            found += f"; pooled, the second half of each: ratio {self.pooled}"
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``logs.columns``."""
+        numbers: dict[str, Observed | None] = {name: getattr(self, name) for name in _WHY_NOT}
+        return {
+            "name": self.name,
+            "residual": self.residual,
+            "windows": self.windows,
+            "read": {kind: self.count(kind) for kind in _WORDS},
+            **{name: to_plain(number) for name, number in numbers.items()},
+            "says": self.says,
+            "reason": {name: why for name, why in _WHY_NOT.items() if numbers[name] is None},
+        }
+
+
+def seen_column(column: Column, theta: Fraction) -> SeenColumn:
+    """Read the windows of one field one by one and put them together; pool them where none shows a ratio."""
+    windows = ([window for window in column.windows if len(window) > FEWEST_STEPS] or column.windows)[-MOST_WINDOWS:]
+    paces = tuple(pace(window, column, theta) for window in windows)
+    short = all(one.kind in ("short", "unsteady") for one in paces)
+    relative, steps = column.residual in RELATIVE, steps_needed(theta)
+    return SeenColumn(
+        name=column.name,
+        residual=column.residual,
+        paces=paces,
+        windows=len(column.windows),
+        ratio=together([one for one in paces if one.kind != "plateau" and one.value is not None]),
+        plateau=together([one for one in paces if one.kind == "plateau"]),
+        pooled=pooled(windows, relative=relative, steps=steps) if short else None,
+    )
+
+
+def _same(one: Observed, other: Observed) -> bool:
+    """True if two plateaus are of one rho."""
+    rho = [1 / (plateau.value - 1) for plateau in (one, other)]
+    return max(rho) <= AGREE * min(rho)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenLog:
+    """One log of a run with constant theta.
+
+    Attributes
+    ----------
+    file, form, theta : str, str, Fraction
+    columns : tuple of SeenColumn
+    readings, rho : tuple of RunReading, Fraction or None
+        Possible meanings of this log, none where nothing in it is steady; rho of the only reading.
+    next : NextRun
+        The run to make next if this were the only log.
+    notes : tuple of str
+    """
+
+    file: str
+    form: str
+    theta: Fraction
+    columns: tuple[SeenColumn, ...]
+    readings: tuple[RunReading, ...]
+    next: NextRun
+    rho: Fraction | None
+    notes: tuple[str, ...]
+
+    @property
+    def steps(self) -> int:
+        """Number of steps over which a ratio had to be steady."""
+        return steps_needed(self.theta)
+
+    @property
+    def paces(self) -> list[Pace]:
+        """The paces of all columns."""
+        return [pace for column in self.columns for pace in column.paces]
+
+    @property
+    def slowest(self) -> Observed | None:
+        """The ratio of the field which is slowest: a norm that does not see a mode falls faster."""
+        found = [column.ratio for column in self.columns if column.ratio is not None]
+        return max(found, key=lambda ratio: ratio.value, default=None)
+
+    @property
+    def plateaus(self) -> list[Observed]:
+        """The plateaus of all fields that show one, as they were read."""
+        return [column.plateau for column in self.columns if column.plateau is not None]
+
+    @property
+    def plateau(self) -> Observed | None:
+        """The plateau of the first residual of relaxed data that shows one; of data that are not relaxed as its equal.
+
+        In a tied run that diverges the stiffest mode is multiplied by -q with ``q = theta (1 + rho) - 1``.  Relaxed
+        data stay at ``1 + 1/rho``, and the data that the other participant returns at ``1 + 1/q``.
+        """
+        found = self.plateaus
+        if not found:
+            return None
+        partner = lambda one: any(_same(one, other.of_relaxed(self.theta)) for other in found if other is not one)
+        relaxed = [one for one in found if partner(one)]
+        relaxed += [one for one in found if 1 / (one.least - 1) * AGREE >= 2 / self.theta - 1]
+        return relaxed[0] if relaxed else found[0].of_relaxed(self.theta)
+
+    @property
+    def rho_elsewise(self) -> Fraction | None:
+        """rho if the only field at a plateau, which may be relaxed, is not; None elsewhere."""
+        found = self.plateaus
+        if len(found) != 1 or self.plateau != found[0]:
+            return None
+        return 1 / (found[0].of_relaxed(self.theta).value - 1)
+
+    @property
+    def stays(self) -> bool:
+        """True if a residual of the run stays at a level or a plateau."""
+        return any(column.count("level", "plateau") for column in self.columns)
+
+    @property
+    def converges(self) -> bool:
+        """True if every field that shows a ratio falls, and none stays at a level, however low."""
+        ratio = self.slowest
+        return (
+            ratio is not None and ratio.most < 1 and not self.stays and not any(c.count("floor") for c in self.columns)
+        )
+
+    @property
+    def diverges(self) -> bool:
+        """True if the run does not converge as far as the log goes."""
+        ratio = self.slowest
+        return self.stays or (ratio is not None and ratio.least > 1)
+
+    @property
+    def swift(self) -> bool:
+        """True if the residual falls so fast, in the mean of every window, that no faster run is looked for."""
+        paces = [pace for pace in self.paces if pace.steps]
+        return bool(paces) and all(pace.swift and not pace.adapts for pace in paces)
+
+    @property
+    def pooled(self) -> Observed | None:
+        """The pace of the slowest field of which all windows are too short."""
+        found = [column.pooled for column in self.columns if column.pooled is not None]
+        return max(found, key=lambda ratio: ratio.value, default=None)
+
+    @property
+    def falls(self) -> bool:
+        """True if the run converges, or is too short to be read and ends below a tenth of its largest residual."""
+        paces = [pace for pace in self.paces if pace.steps]
+        unread = self.slowest is None and not self.stays and bool(paces)
+        return self.converges or (unread and all(not p.lost and p.height < FALLEN for p in paces))
+
+    @property
+    def made(self) -> Made:
+        """Data from which the next run is chosen."""
+        most = None if self.slowest is None else self.slowest.most
+        return Made(theta=self.theta, falls=self.falls, rises=self.diverges, ratio=most)
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``logs``."""
+        return {
+            "file": self.file,
+            "form": self.form,
+            "theta": float(self.theta),
+            "steady_over": self.steps,
+            "columns": to_plain(self.columns),
+            "readings": to_plain(self.readings),
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogBound:
+    """A bound of rho, the log that it comes from, the reason in words, and its assumption."""
+
+    value: Fraction
+    log: SeenLog
+    says: str
+    assumes: str
+
+    def to_dict(self, *, up: bool) -> dict[str, Any]:
+        """The object ``interval.lo`` or ``interval.hi``, whose value is rounded outwards."""
+        return {
+            "value": above(self.value) if up else below(self.value),
+            "file": self.log.file,
+            "theta": float(self.log.theta),
+            "says": self.says,
+            "assumes": self.assumes,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class RhoInterval:
+    """Bounds of rho from the logs of one coupling together; ``contradiction`` says why no rho lies between them."""
+
+    lo: LogBound | None
+    hi: LogBound | None
+    contradiction: str | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``interval``."""
+        agree = "the logs agree" if self.lo and self.hi else "one bound alone contradicts nothing"
+        why = {"lo": "no log bounds rho from below without a reading", "hi": "no log converges", "contradiction": agree}
+        return {
+            "lo": None if self.lo is None else self.lo.to_dict(up=False),
+            "hi": None if self.hi is None else self.hi.to_dict(up=True),
+            "contradiction": self.contradiction,
+            "reason": {name: words for name, words in why.items() if getattr(self, name) is None},
+        }
+
+
+def bounds(logs: Sequence[SeenLog]) -> tuple[list[LogBound], list[LogBound]]:
+    """Every bound of rho from below and from above that a log gives."""
+    lower, upper = [], []
+    for log in logs:
+        ratio, plateau, theta = log.slowest, log.plateau, log.theta
+        if ratio is not None and not {"mode-low", "open"} & {reading.kind for reading in log.readings}:
+            says = f"its residual changes by {few(ratio.least)} a step or more, beyond 1 - theta"
+            lower.append(LogBound(value=(1 + ratio.least) / theta - 1, log=log, says=says, assumes=FROM_BELOW))
+        if log.diverges:
+            lower.append(LogBound(value=2 / theta - 1, log=log, says="it does not converge", assumes=FROM_BELOW))
+        if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):
+            says = f"the relative residual of relaxed data stays at {few(plateau.value)}"
+            lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=TIED))
+        if ratio is not None and log.converges:
+            says = f"its residual changes by {few(ratio.most)} a step at most"
+            upper.append(LogBound(value=(1 + ratio.most) / theta - 1, log=log, says=says, assumes=FROM_ABOVE))
+    return lower, upper

@@ -1,0 +1,380 @@
+"""Both bodies by the interface stiffness that was given, as matrices or operators, and the transfer between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse.linalg import LinearOperator
+
+from fem1d2d import MeshError, solver_with_inertia
+from fem1d2d.mesh import Floats
+from verification.coupling.kinds import BodyNumber
+from verification.interface.matrices import MOST_ROWS, Stiffness, real_array, size, stiffness
+from verification.value import to_plain
+
+#: Up to this asymmetry the symmetric part of a matrix is taken, with a note.
+TOLD = 1e-3
+
+#: How far a solve may be from the inverse of the product beside it.
+INVERSE = 1e-3
+
+#: From this share of zeros off the diagonal on a matrix looks assembled.  A Schur complement on an interface of which
+#: the components do not act on each other has up to 2/3; linear triangles at 60 unknowns have 3/4 and more.
+SPARSE = 0.75
+
+#: The ordering that is assumed where it matters.
+ORDERING = "tangential components from left to right, then normal ones"
+
+#: The Neumann bodies of the roles, in their order.
+BODIES: tuple[BodyNumber, BodyNumber] = (2, 1)
+
+Apply = Callable[[Floats], Floats]
+
+
+# --- in documents -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenMatrix:
+    """One matrix or operator.
+
+    Attributes
+    ----------
+    rows, form : int, {'matrix', 'operator'}
+    asymmetry : float or None
+        ``max |A - A'| / max |A|``; of an operator ``|x'Ay - y'Ax|`` over the size of its terms for two random vectors;
+        None where only its solves are known.
+    zeros, free_motions : float or None, int or None
+        The share of zeros off the diagonal, and the number of rigid motions that its supports leave; None of an
+        operator.
+    """
+
+    rows: int
+    form: Literal["matrix", "operator"]
+    asymmetry: float | None = None
+    zeros: float | None = None
+    free_motions: int | None = None
+
+    def notes(self, name: str, rounding: float) -> list[str]:
+        """Warnings for the user; an asymmetry up to ``rounding`` is rounding."""
+        found = []
+        if self.asymmetry is not None and self.asymmetry > rounding:
+            taken = "its symmetric part is taken" if self.form == "matrix" else "no residual means less than that"
+            if self.form == "matrix" and self.asymmetry > TOLD:
+                taken = "eigenvalues may be complex, and no theorem applies"
+            found.append(f"{name} is asymmetric by {self.asymmetry:.2g} of its largest entry: {taken}")
+        if self.zeros is not None and self.zeros >= SPARSE:
+            found.append(
+                f"{100 * self.zeros:.0f} % of the entries of {name} off the diagonal are 0, as in an assembled"
+                f" stiffness matrix ({100 * SPARSE:.0f} % or more); a Schur complement on the interface is dense."
+                "  If it is the matrix of a whole body, condense it first: rho below is not the coupling's"
+            )
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``matrices``."""
+        why = {"asymmetry": "known by its solves alone"} | dict.fromkeys(
+            ("zeros", "free_motions"), "an operator tells no entries"
+        )
+        return {**asdict(self), "reason": {name: words for name, words in why.items() if getattr(self, name) is None}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenLanczos:
+    """The ends of the spectrum of (S_c, S_n) for one role, by Lanczos.
+
+    ``rho`` and ``rho_min`` are Rayleigh quotients, so that the largest eigenvalue is at least ``rho`` and the least one
+    at most ``rho_min``; some eigenvalue lies within each residual.
+    """
+
+    neumann_body: BodyNumber
+    rho: float
+    residual: float
+    rho_min: float
+    residual_min: float
+    steps: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenMatrices:
+    """The matrices or operators that were given.
+
+    Attributes
+    ----------
+    S1, S2 : SeenMatrix
+    transfer, neumann_body : tuple of int or None, {1, 2} or None
+        Rows and columns of P as given, and the body from whose unknowns it leads; None without P.
+    ordering : str or None
+        The ordering that is assumed; None where rho does not depend on it.
+    lanczos : tuple of SeenLanczos
+        Empty where matrices gave the whole spectrum.
+    notes : tuple of str
+        Warnings for the user.
+    """
+
+    S1: SeenMatrix
+    S2: SeenMatrix
+    transfer: tuple[int, int] | None = None
+    neumann_body: BodyNumber | None = None
+    ordering: str | None = None
+    lanczos: tuple[SeenLanczos, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``matrices``."""
+        why = dict.fromkeys(("transfer", "neumann_body"), "no transfer was given")
+        why["ordering"] = "rho does not depend on it, so long as both have the same"
+        return {
+            **{name: to_plain(value) for name, value in vars(self).items()},
+            "lanczos": [asdict(found) for found in self.lanczos],
+            "reason": {name: words for name, words in why.items() if getattr(self, name) is None},
+        }
+
+
+# --- one body ---------------------------------------------------------------------------------------------------------
+
+
+def other(body: BodyNumber) -> BodyNumber:
+    """The other body."""
+    return 1 if body == 2 else 2
+
+
+def is_operator(S: Any) -> bool:
+    """True for an operator, and for a sparse matrix beyond the size of dense ones."""
+    if sp.issparse(S):
+        return bool(S.shape[0] > MOST_ROWS)
+    return isinstance(S, LinearOperator) or callable(S)
+
+
+def dense(name: str, matrix: Any, needed: str = "a matrix of real numbers") -> Floats:
+    """A matrix of real numbers, dense, in any unit."""
+    if matrix is None:
+        raise ValueError(f"no {name}: needed S1 and S2, or an operator for each")
+    return real_array(name, matrix, (None, None), needed, most=np.inf)
+
+
+def sparse(name: str, matrix: Any) -> sp.csc_array | None:
+    """A sparse matrix of real numbers; None where it is not sparse."""
+    if not sp.issparse(matrix):
+        return None
+    found = sp.csc_array(matrix)
+    found.data = real_array(name, found.data, found.data.shape, "real numbers", most=np.inf)
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Side:
+    """One body: its matrix, None of an operator, and ``u -> S u`` and ``f -> S^-1 f``, None if not known."""
+
+    seen: SeenMatrix
+    matrix: Stiffness | None = None
+    apply: Apply | None = None
+    solve: Apply | None = None
+
+    @property
+    def singular(self) -> str:
+        """Why a matrix is singular; empty where it is not, and of an operator."""
+        free = 0 if self.matrix is None else self.matrix.motions.shape[1]
+        return f"singular ({free} free motion{'s' * (free > 1)})" if free else ""
+
+
+def of_matrix(body: BodyNumber, S: Any, *, general: bool = False) -> Side:
+    """A body by its matrix; a ``general`` one may be asymmetric.
+
+    Raises
+    ------
+    ValueError
+        No stiffness.
+    """
+    name = f"S{body}"
+    S = stiffness(name, dense(name, S, "a square matrix of real numbers"), asymmetry=TOLD, general=general)
+    n, free = len(S.matrix), S.motions.shape[1]
+    seen = SeenMatrix(rows=n, form="matrix", asymmetry=S.asymmetry, zeros=S.zeros, free_motions=free)
+    return Side(matrix=S, apply=S.matrix.__matmul__, seen=seen)
+
+
+def rows_of(given: dict[BodyNumber, tuple[Any, Any]], unknowns: Any, transfer: Any) -> dict[int, int]:
+    """Number of unknowns of each body on the interface, by the sizes of (S, solve) that were given.
+
+    Raises
+    ------
+    ValueError
+    """
+    told: dict[int, set[int]] = {
+        body: {int(thing.shape[0]) for thing in things if hasattr(thing, "shape") and len(thing.shape) == 2}
+        for body, things in given.items()
+    }
+    for body, sizes in told.items():
+        if len(sizes) > 1:
+            raise ValueError(
+                f"S{body} and solve{body} have {' and '.join(map(str, sorted(sizes)))} rows: needed one size"
+            )
+    if unknowns is not None and not (isinstance(unknowns, int) and unknowns > 0):
+        raise ValueError(f"unknowns {unknowns!r}: needed a whole number > 0")
+    rows: dict[int, int] = {}
+    for body, sizes in told.items():
+        others = told[3 - body] if transfer is None else set()
+        known = sizes or others or ({unknowns} if unknowns is not None else set())
+        if not known:
+            raise ValueError(f"functions alone do not tell how many unknowns body {body} has: needed unknowns")
+        rows[body] = int(next(iter(known)))
+    return rows
+
+
+def of_solver(body: BodyNumber, S: Any, solve: Any, n: int) -> Side:
+    """A body by products and solves with vectors of n numbers, tried on random ones.
+
+    Raises
+    ------
+    ValueError
+        No stiffness, or not its inverse.
+    """
+    name = f"S{body}"
+    apply = _function(name, S, n)
+    inverse = _function(f"solve{body}", solve, n)
+    side = Side(seen=SeenMatrix(rows=n, form="operator"), apply=apply)
+    if S is not None and not is_operator(S):
+        side = of_matrix(body, S)
+        assert side.matrix is not None
+        if inverse is None and not side.singular:
+            factor = cho_factor(side.matrix.matrix)
+            inverse = lambda f: np.asarray(cho_solve(factor, f))
+    elif (matrix := sparse(name, S)) is not None:
+        side, inverse = _of_sparse(name, matrix, inverse)
+    seen, apply = side.seen, side.apply
+    u, v = np.random.default_rng(1).standard_normal((2, n))
+    if apply is not None:
+        Su, Sv = apply(u), apply(v)
+        energies = float(u @ Su), float(v @ Sv)
+        if not min(energies) >= 0:
+            raise ValueError(f"{name} is not positive (u'Su = {min(energies):.3g} for some u): needed a stiffness")
+        if seen.form == "operator":
+            scale = np.sqrt(energies[0] * energies[1]) or 1.0
+            seen = replace(seen, asymmetry=_symmetric(name, abs(float(u @ Sv - v @ Su)) / scale))
+    if inverse is not None and solve is not None:
+        Fu, Fv = inverse(u), inverse(v)
+        energies = float(u @ Fu), float(v @ Fv)
+        if not min(energies) > 0:
+            raise ValueError(
+                f"solve{body} is not positive (f'u = {min(energies):.3g} for some f): needed the inverse of S"
+            )
+        _symmetric(f"solve{body}", abs(float(u @ Fv - v @ Fu)) / float(np.sqrt(energies[0] * energies[1])))
+        if apply is not None and not (off := float(np.linalg.norm(apply(Fu) - u) / np.linalg.norm(u))) <= INVERSE:
+            raise ValueError(
+                f"solve{body} is not the inverse of {name}: their product changes a vector by {off:.2g} of it"
+            )
+    return replace(side, solve=inverse, seen=seen)
+
+
+def _of_sparse(name: str, S: sp.csc_array, inverse: Apply | None) -> tuple[Side, Apply | None]:
+    """A body by a sparse matrix, and solves with its factor where none are given."""
+    n = S.shape[0]
+    skew = abs(S - S.T).max() / abs(S).max()
+    if not skew <= TOLD:
+        raise ValueError(f"{name} is not symmetric (|A - A'| is {skew:.2g} of its largest entry): needed a stiffness")
+    symmetric = sp.csc_array((S + S.T) / 2)
+    full = (S.count_nonzero() - np.count_nonzero(S.diagonal())) / (n * n - n)
+    if inverse is None:
+        try:
+            inverse, negative = solver_with_inertia(symmetric)
+        except MeshError:  # a pivot is 0
+            negative = None
+        if negative is None or negative:
+            raise ValueError(f"{name} is not positive definite: needed a Schur complement of a stiffness matrix")
+    seen = SeenMatrix(rows=n, form="matrix", asymmetry=float(skew), zeros=1 - full, free_motions=0)
+    return Side(seen=seen, apply=symmetric.__matmul__), inverse
+
+
+def _symmetric(name: str, skew: float) -> float:
+    if not skew <= TOLD:
+        raise ValueError(f"{name} is not symmetric (by {skew:.2g} of its size): needed at most {TOLD:g}")
+    return skew
+
+
+def _function(name: str, given: Any, n: int) -> Apply | None:
+    """A product or a solve as a function that is held to vectors of n finite numbers."""
+    if given is None:
+        return None
+    if not callable(given) or isinstance(given, LinearOperator) or sp.issparse(given):
+        shape = getattr(given, "shape", None)
+        if shape is not None and tuple(shape) != (n, n):
+            raise ValueError(f"{name} is {' x '.join(map(str, shape))}: needed {n} x {n}")
+        function = given.__matmul__
+    else:
+        function = given
+
+    def checked(vector: Floats) -> Floats:
+        return real_array(f"what {name} returns", function(vector), (n,), most=np.inf)
+
+    return checked
+
+
+# --- the transfer -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transfer:
+    """The transfer P between two grids as it was given, from the unknowns of ``neumann_body``.
+
+    It applies to each of the ``components`` at the nodes; ``chosen`` is True if its shape fits both ways.
+    """
+
+    P: Any
+    neumann_body: BodyNumber
+    components: int
+    chosen: bool
+
+    def carry(self, u: Floats) -> Floats:
+        """``P u``."""
+        return np.concatenate([self.P @ part for part in u.reshape(self.components, -1, *u.shape[1:])])
+
+    def carry_back(self, f: Floats) -> Floats:
+        """``P' f``."""
+        back = self.P.rmatvec if isinstance(self.P, LinearOperator) else self.P.T.__matmul__
+        return np.concatenate([back(part) for part in f.reshape(self.components, -1, *f.shape[1:])])
+
+    @property
+    def notes(self) -> list[str]:
+        """Warnings for the user."""
+        if not self.chosen:
+            return []
+        n = self.neumann_body
+        return [f"P is read as leading from body {n} to body {3 - n}: its shape fits both ways"]
+
+
+def read_transfer(given: Any, rows: dict[int, int], neumann_body: BodyNumber | None) -> Transfer | None:
+    """The transfer P, whose direction its shape decides; None without one.
+
+    Raises
+    ------
+    ValueError
+        It does not fit, or there is none and the bodies have not as many unknowns.
+    """
+    if given is None:
+        if rows[1] != rows[2]:
+            sizes = ", ".join(f"S{body} is {n} x {n}" for body, n in rows.items())
+            raise ValueError(f"{sizes}: needed matrices on the same interface unknowns, or a transfer")
+        return None
+    P: Any = given if isinstance(given, LinearOperator) else sparse("the transfer", given)
+    P = dense("the transfer", given) if P is None else P
+    if min(P.shape) == 0:
+        raise ValueError(f"the transfer is {size(P)}: needed a matrix")
+    bodies: tuple[BodyNumber, ...] = BODIES if neumann_body is None else (neumann_body,)
+    fits = [
+        (body, components)
+        for body in bodies
+        for components in (1, 2, 3)
+        if (P.shape[0] * components, P.shape[1] * components) == (rows[3 - body], rows[body])
+    ]
+    if not fits:
+        needed = (
+            "needed a row for each unknown of the contact body, a column for each of the Neumann body, or for nodes"
+        )
+        raise ValueError(f"the transfer is {P.shape[0]} x {P.shape[1]}, S1 has {rows[1]} rows, S2 {rows[2]}: {needed}")
+    body, components = fits[0]
+    return Transfer(P=P, neumann_body=body, components=components, chosen=len({body for body, _ in fits}) > 1)

@@ -1,0 +1,1 @@
+"""The process on its machine: threads, signals, progress."""

@@ -1,0 +1,142 @@
+"""The forms of the semidefinite bound in traces (d, c), and whether they are positive definite in spite of rounding.
+
+With ``g = S_2 d`` and ``p = P c`` every term but ``|a p + b g|^2`` is a product of the interface matrices themselves.
+That term has an inverse, ``|.|^2 = .' S_2^-1 .``, which a Schur complement takes away: ``Q - weight M' S_2^-1 M`` is
+positive definite if and only if ``[[S_2 / weight, M], [M', Q]]`` is.  So rounding enters only by sums and products, and
+has a bound.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from fem1d2d.proofs.enclosed import Enclosed, gamma, upwards
+from fem1d2d.proofs.loewner import positive_definite
+from verification.interface.interface import Grid
+from verification.interface.pair import ContactPair
+
+
+def families(
+    contact: Grid, force: Floats, jump: Floats, weight: Floats | None, zeta: Floats | None
+) -> list[tuple[Floats, Floats]]:
+    """Factors of the multiplied conditions, a row for each node; only of (2.4) without friction.
+
+    Those behind the fourth are for :class:`verification.semidefinite.conditions.Pieces`.  ``force`` and ``jump`` are
+    the forms p and v, ``weight`` is ``sqrt(w k)`` as a column and ``zeta`` the form zeta times it.
+    """
+    press, gap = force[contact.normal], jump[contact.normal]
+    if weight is None or zeta is None:
+        return [(press, gap)]
+    shear, slip = force[contact.tangential], jump[contact.tangential]
+    slide = weight * slip
+    found = [(press, gap), (shear, slip), (zeta, zeta), (slide, slide)]
+    return [*found, (zeta, slide), (gap, gap), (press, press), (shear, shear), (shear, zeta)]
+
+
+class TraceForms:
+    """The forms of a pair of bodies at a friction k > 0, or at 0, in place of the pair's.
+
+    Without friction p has no tangential part: c is then the normal part of a trace and P has S_1 with the tangential
+    components condensed out.
+
+    Parameters
+    ----------
+    S_1, carries : array of shape (m, m), slice
+        From c to the components of p that are not 0, and these components.
+    near : arrays of shape (N, N) and (m, m)
+        Changes of d and of c, as columns, in which the forms are of size 1: the nearer, the less is lost to rounding.
+    """
+
+    def __init__(
+        self, pair: ContactPair, k: float, *, S_1: Floats, carries: slice, near: tuple[Floats, Floats]
+    ) -> None:
+        contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
+        S_2, size = pair.neumann.schur, neumann.size
+        still = np.zeros((contact.size, len(S_1)))
+        moved, pressed = still.copy(), still.copy()
+        moved[carries], pressed[carries] = np.eye(len(S_1)), S_1
+        self._S_2, self._near = S_2, near
+        none = np.zeros((size, len(S_1)))
+        self._d = np.hstack([np.eye(size), none])
+        self._g = np.hstack([S_2, none])
+        self._p = np.hstack([np.zeros((size, size)), interface.carry_back(pressed)])
+        moduli = interface.moduli
+        self._p_size = np.hstack([np.zeros((size, size)), moduli.carry_back(np.abs(pressed))])
+        force = np.hstack([np.zeros((contact.size, size)), pressed])
+        jump = -np.hstack([interface.carry(np.eye(size)), moved])
+        weight = zeta = zeta_size = None
+        if k:
+            assert interface.kernel is not None
+            weight = np.sqrt(k * contact.weights)[:, None]
+            zeta = weight * (interface.kernel @ self._g[neumann.normal])
+            zeta_size = weight * (np.abs(interface.kernel) @ np.abs(self._g[neumann.normal]))
+        self._families = families(contact, force, jump, weight, zeta)
+        self._sizes = families(contact, np.abs(force), np.abs(jump), weight, zeta_size)
+        # inner products over nodes (a transfer has them too), over traces twice, and the scalars, weights and sums
+        self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 30
+        self._free = _changed(S_2, near[:1])
+        self._free_error = self._error(np.abs(S_2), near[:1])
+
+    def _error(self, size: Floats, near: Sequence[Floats]) -> Floats:
+        """A bound of the rounding errors of a form in the coordinates of some columns, from the moduli of its terms."""
+        return np.asarray(
+            upwards(gamma(self._terms) * _changed(size, [np.abs(columns) for columns in near]), self._terms)
+        )
+
+    def with_multipliers(
+        self, multipliers: Sequence[Floats], *, cross: float = 0.0, step: tuple[float, float] | None = None
+    ) -> Callable[..., bool]:
+        """Test of ``square |g|^2 - cross <g, p> - weight |a p + b g|^2 - conditions``, ``step`` being (a, b) if any.
+
+        The result takes the square and, with a step, its weight, 1 by default; it is True if the form is positive
+        definite for sure.
+        """
+        form = -cross * self._d.T @ self._p - _conditions(multipliers, self._families)
+        size = abs(cross) * self._d.T @ self._p_size + _conditions([np.abs(m) for m in multipliers], self._sizes)
+        near: tuple[Floats, ...] = self._near
+        first = 0
+        if step is not None:
+            a, b = step
+            row, row_size = a * self._p + b * self._g, abs(a) * self._p_size + abs(b) * np.abs(self._g)
+            form = np.block([[self._S_2, row], [row.T, form]])
+            size = np.block([[np.abs(self._S_2), row_size], [row_size.T, size]])
+            near, first = (near[0], *near), len(row)
+        form, size = _changed(form, near), self._error(size, near)
+        d = slice(first, first + len(self._S_2))
+
+        def definite(square: float, weight: float = 1.0) -> bool:
+            matrix, error = form.copy(), size.copy()
+            root = math.sqrt(weight)  # in coordinates larger by this, S_2 / weight is of size 1
+            for part in (matrix, error):
+                part[:first, :first] *= root * root / weight
+                part[:first, first:] *= root
+                part[first:, :first] *= root
+            matrix[d, d] += square * self._free
+            error[d, d] += abs(square) * self._free_error
+            return positive_definite(Enclosed(middle=matrix, radius=error))
+
+        return definite
+
+
+def _changed(form: Floats, near: Sequence[Floats]) -> Floats:
+    """A form in the coordinates of some columns, block by block on the diagonal; symmetric to the last digit."""
+    form = (form + form.T) / 2
+    ends = np.cumsum([0, *(len(columns) for columns in near)])
+    parts = [slice(*pair) for pair in pairwise(ends.tolist())]
+    result = np.empty((sum(columns.shape[1] for columns in near),) * 2)
+    for i, rows in enumerate(parts):
+        for j, columns in enumerate(parts[: i + 1]):
+            block = near[i].T @ form[rows, columns] @ near[j]
+            result[rows, columns] = block if i > j else (block + block.T) / 2
+            result[columns, rows] = result[rows, columns].T
+    return result
+
+
+def _conditions(multipliers: Sequence[Floats], families: Sequence[tuple[Floats, Floats]]) -> Floats:
+    """The sum over the nodes of the multiplied conditions; the last families are left out where nothing is fixed."""
+    return np.asarray(sum(a.T @ (values[:, None] * b) for values, (a, b) in zip(multipliers, families, strict=False)))

@@ -1,0 +1,87 @@
+"""The answer of a comparison in three lines, before its tables: what the run did, what is proved of it, which theta."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ndtheory import EnergyBounds
+from verification.algorithm.runs import Run
+from verification.bounds.bound import BoundResult
+from verification.show.numbers import factor, figures, interval, near_one
+from verification.show.parts import Labelled, Section, section
+from verification.show.run import ended
+
+#: What the lines of the answer mean.
+CAPTION = (
+    "What this run did; by which factor one step multiplies the error at most, whatever the loads; which theta is "
+    "predicted to be the best one, and which ones a bound allows."
+)
+
+
+def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
+    """The answer after a run.
+
+    Parameters
+    ----------
+    finished : Run
+    bounds : sequence of BoundResult
+        Those that follow from the constants; the others take longer, and come below.
+    """
+    proved = [bound for bound in bounds if bound.proved and bound.worked_out]
+    applies = finished.relaxation == "constant" and not finished.outside
+    theta = _theta(proved, allowed=_widest(proved) if applies else None)
+    parts = (Labelled("observed", _seen(finished)), Labelled("bound", _bound(finished, proved)), *theta)
+    return section("answer", "DOES IT CONVERGE, AND HOW FAST?", *parts, caption=CAPTION)
+
+
+def _seen(finished: Run) -> str:
+    """How the run ended, and its rate."""
+    count = f"{finished.iterations} step{'s' * (finished.iterations != 1)}"
+    steps = f"{ended(finished)} after {count}"
+    if finished.observed_growth is not None:
+        return f"{steps}; each multiplies the error by {finished.observed_growth:.4g}"
+    if finished.observed_rate is None and finished.converged:
+        return f"{steps}, too few to see a rate"
+    if finished.observed_rate is None or finished.outcome == "stalled":
+        return steps
+    return f"{steps}, each leaving {near_one(finished.observed_rate.value)} of the error"
+
+
+def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
+    """The smallest factor that a bound gives for one step, or how far the bounds reach; none may be known yet."""
+    if finished.relaxation != "constant":
+        return f"none: bounds are for a constant theta, not for {finished.relaxation}"
+    if finished.outside:
+        return "none: the problem is outside the theorem"
+    if not bounds:
+        return "see below"
+    found = [bound for bound in bounds if bound.factor is not None]
+    if not found and (allowed := _widest(bounds)) is not None:
+        return f"none at this theta: outside {interval(allowed.interval, allowed.interval_level)}"
+    if not found:
+        limits = [bound.friction.some.value for bound in bounds if bound.friction.some is not None]
+        varies = any(bound.friction.on == "multiple" for bound in bounds)
+        what = "for less than {} times as much" if varies else "for k < {}"
+        reach = f"; some theta contracts {what.format(figures(max(limits)))}" if limits else ""
+        return f"none at this friction{reach}"
+    best = min(found, key=lambda bound: bound.factor.value if bound.factor is not None else 1.0)
+    how = "in doubles" if best.level == "float" else best.level
+    return f"at most {factor(best.factor, best.one_minus_factor)} of the error is left ({best.name}, {how})"
+
+
+def _theta(bounds: Sequence[BoundResult], allowed: BoundResult | None) -> list[Labelled]:
+    """The theta that is predicted to be the best one, and those that a bound allows."""
+    words = []
+    for detail in (bound.detail for bound in bounds):
+        if isinstance(detail, EnergyBounds):
+            words.append(f"{figures(detail.theta_predicted)} predicted best")
+    if allowed is not None:
+        words.append(f"the {allowed.name} bound allows {interval(allowed.interval, allowed.interval_level)}")
+    return [Labelled("theta", "; ".join(words))] if words else []
+
+
+def _widest(bounds: Sequence[BoundResult]) -> BoundResult | None:
+    """The bound that allows most theta; None where none allows any."""
+    width = lambda bound: bound.interval[1] - bound.interval[0] if bound.interval is not None else -1.0
+    widest = max(bounds, key=width, default=None)
+    return None if widest is None or widest.interval is None else widest

@@ -1,0 +1,152 @@
+"""A comparison: each section as soon as it is known, or all of them at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from verification.algorithm.reference import Reference
+from verification.algorithm.runs import Run
+from verification.algorithm.theta import Choice
+from verification.bounds.bound import BoundResult
+from verification.bounds.verdicts import RunVerdict
+from verification.comparison import Comparison, Listener
+from verification.constants import Measured
+from verification.interface.pair import ContactPair
+from verification.semidefinite.losses import Losses
+from verification.show.answer import answer
+from verification.show.bounds import bounds, contracts, thetas
+from verification.show.constants import compared
+from verification.show.constants import sections as all_constants
+from verification.show.numbers import near_one
+from verification.show.parts import Labelled, Note, Section, Sections, following, of, section, table
+from verification.show.run import happened
+from verification.show.setting import limits, outside_the_theorem, setting
+
+#: The captions of the table of verdicts and of the figure of the losses.
+RATIOS = (
+    "Each bound beside the largest ratio of successive residuals in the norm (5.21), in which forces count by the "
+    "energy that they store in the Neumann body; forecast: what was said half way, beside the end of the run."
+)
+WATERFALL = (
+    (
+        "waterfall",
+        "What the inequalities of the proof lose, in powers of ten. At the top each one stands by itself, at the pair "
+        "of forces that comes closest to equality; these pairs differ, so these bars do not add up. Below it one "
+        "quantity is followed step by step to its bound in each panel, and the bars add up; what leads from the "
+        "repaired to the printed bound is only the unit of stress.",
+    ),
+)
+
+
+#: The verdicts as they are read; a bound has no conclusion where its hypotheses are not met.
+WORDS: Mapping[RunVerdict, str] = {
+    "CONSISTENT": "consistent",
+    "VIOLATED": "violated",
+    "INCONCLUSIVE": "inconclusive",
+    "HYPOTHESES_NOT_MET": "no conclusion",
+    "NOT_COMPUTED": "not computed",
+}
+
+#: Verdicts that are not on a bound, as they are read.
+NAMES: Mapping[str, str] = {"linearised": "forecast"}
+
+
+class Parts(Listener):
+    """Passes the sections of a comparison to ``show``, each when it is known; several of one id may follow each other.
+
+    The pair is made from a problem.  The answer comes first: what is known before the run waits for it, until the
+    listener is closed at the latest: where a run is slow, its bounds appear late.
+    """
+
+    def __init__(self, pair: ContactPair, show: Callable[[Sections], None]) -> None:
+        self.pair, self.show, self.unit = pair, show, pair.units["stress"]
+        self.waiting: list[Section] = []
+        self.results: Sequence[BoundResult] = ()
+
+    def __enter__(self) -> Parts:
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        """Show what waited for a run that did not come."""
+        if self.waiting:
+            self.show(tuple(self.waiting))
+            self.waiting = []
+
+    def constants(self, measured: Measured, choice: Choice) -> None:
+        problem = self.pair.problem
+        assert problem is not None  # see `sections`
+        first = setting(problem.with_theta(choice.theta), measured.nodes, measured.interface_nodes)
+        self.show((first,))
+        if measured.unverified is not None:
+            self.waiting.append(compared(measured))
+
+    def bounds(self, results: Sequence[BoundResult], measured: Measured) -> None:
+        self.results = self._told(results)
+        self.waiting.append(contracts(self.results, self.unit, measured.why_no_energy))
+
+    def _told(self, results: Sequence[BoundResult]) -> Sequence[BoundResult]:
+        """The results; where friction varies along Gamma_c its thresholds are factors by which it may grow."""
+        if not self.pair.interface.varies:
+            return results
+        return [replace(result, friction=result.friction.over(self.pair.friction)) for result in results]
+
+    def run(self, finished: Run) -> None:
+        before, self.waiting = self.waiting, []
+        self.show((answer(finished, self.results), *before, happened(finished, alone=False)))
+
+    def cvxpy(self, reference: Reference | None, why: str) -> None:
+        part: Labelled | str = f"cvxpy: {why}"
+        if reference is not None:
+            rate = "no rate" if reference.observed_rate is None else f"rate {near_one(reference.observed_rate)}"
+            what = f"{rate}, {reference.steps - 1} steps" if reference.whole else "first and last step"
+            part = Labelled("check by cvxpy", f"{what}; forces differ by {reference.largest_difference:.0e} at most")
+        self.show((section("run", "", part),))
+
+    def losses(self, losses: Losses | None, why: str) -> None:
+        friction = () if losses is None else losses.friction
+        parts = [f"losses: {why}"] if why else []
+        if friction:
+            estimates = [loss for loss in friction if not loss.only_unit]
+            total = sum(loss.decades for loss in estimates)
+            unit = sum(loss.decades for loss in friction) - total
+            links = ", ".join(f"10^{loss.decades:.1f} by {loss.label}" for loss in estimates)
+            sizes = f"10^{total:.1f} times what was found (printed 10^{total + unit:.1f})"
+            parts.append(f"(5.30), the friction bound, is {sizes}: {links}.")
+        if parts:
+            self.show((section("losses", "HOW MUCH DOES EACH ESTIMATE LOSE?", *parts, pictures=WATERFALL),))
+
+    def programs(self, results: Sequence[BoundResult]) -> None:
+        parts = [
+            *bounds(self._told(results), self.unit),
+            *(f"{r.name}: {r.not_computed}" for r in results if not r.worked_out),
+        ]
+        title = "WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?"
+        caption = "The same for the bound that takes the matrices of the bodies."
+        if parts:
+            self.show((section("programs", title, *parts, caption=caption),))
+
+
+def verdicts(result: Comparison) -> Sections:
+    """The end of a comparison."""
+    judged = table(
+        ("bound", "verdict", "why"), [(NAMES.get(n, n), WORDS[j.verdict], j.reason) for n, j in result.verdicts.items()]
+    )
+    title = "DOES THE RUN AGREE WITH THE BOUND?"
+    return section("verdicts", title, judged, caption=RATIOS), limits(result.run.outside, following("advise"))
+
+
+@of.register
+def sections(result: Comparison) -> Sections:
+    """The sections; a report has more at its beginning and end: warnings, the theta, all constants."""
+    if result.problem is None:
+        return ()
+    found: list[Section] = []
+    result.tell(Parts(result.run.pair, found.extend))
+    warnings = [outside_the_theorem(reason) for reason in result.run.outside]
+    warnings += [Note(f"{warning}.", 0, "Warning:") for warning in result.run.warnings]
+    first = [replace(section("setting", "", *warnings), only="report")] if warnings else []
+    details = [bound.detail for bound in result.bounds.values()]
+    _, *constants = all_constants(result.measured)
+    last = [replace(each, only="report") for each in (*thetas(details), *constants)]
+    return (found[0], *first, *found[1:], *verdicts(result), *last)
