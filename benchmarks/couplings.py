@@ -27,10 +27,10 @@ from scipy.sparse.linalg import splu
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 import verification as vf
-from verification.algorithm.relaxation import RULES
 from verification.coupling.methods import METHODS, NEAR
 from verification.coupling.methods import advised as methods_advised
 from verification.coupling.readings import steps_needed
+from verification.registry import RULES
 
 #: A run has arrived where its residual is this share of the force.
 ARRIVED = 1e-8

@@ -1,7 +1,8 @@
 """The numbered statements of the paper, and facts of ours: what each claims, and what is wrong with it if anything is.
 
 The texts are data, in ``statements.toml`` beside this module.  So are the recorded verdicts; each must be earned by
-evidence (:mod:`verification.ledger`).
+evidence (:mod:`verification.ledger`).  Pages and screens quote verdicts and texts from here, so that none of them
+contradicts another or the ledger.
 """
 
 from __future__ import annotations
@@ -15,6 +16,10 @@ from importlib.resources import files
 from typing import Any, Literal
 
 Fault = Literal["false as printed", "does not follow", "gap", "typo"]
+
+
+#: The texts of a statement that may be quoted.
+TEXTS = ("title", "claims", "wrong", "repair", "proof", "note")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +84,41 @@ def statements() -> dict[str, Statement]:
     """
     rows = _file()["statement"]
     return {row["id"]: Statement(**{**row, "leans_on": tuple(row.get("leans_on", ()))}) for row in rows}
+
+
+def recorded() -> dict[str, str]:
+    """The recorded verdicts by id."""
+    return {id: statement.verdict for id, statement in statements().items() if statement.verdict}
+
+
+def quote(id: str, what: str = "verdict") -> str:
+    """The recorded verdict on a statement, or one of its texts.
+
+    Parameters
+    ----------
+    id : str
+        Of the statement.
+    what : str
+        'verdict', or a text: 'title', 'claims', 'wrong', 'repair', 'proof', 'note', with formulas in TeX.
+
+    Raises
+    ------
+    ValueError
+        No such statement, or it has no such text.
+
+    Examples
+    --------
+    >>> quote("5.12"), quote("5.12", "title")
+    ('PROVED', 'Both obstacle problems added')
+    """
+    if id not in statements():
+        raise ValueError(f"{id!r}: no such statement")
+    if what == "verdict":
+        return recorded()[id]
+    text: str = getattr(statements()[id], what) if what in TEXTS else ""
+    if not text:
+        raise ValueError(f"{what!r} of {id}: needed 'verdict' or one of {', '.join(TEXTS)} that is not empty")
+    return text
 
 
 def proof_of(ids: Collection[str]) -> dict[str, Statement]:

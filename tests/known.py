@@ -7,15 +7,14 @@ from typing import Any
 
 from shared import Shared
 
-from verification import comparison
 from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
-from verification.semidefinite import lipschitz, multipliers
+from verification.semidefinite import lipschitz, losses, multipliers
 
 #: Most of the time of a comparison goes into these: module and name.
-DEAR = [(comparison, "locate"), (multipliers, "friction_threshold"), (lipschitz, "work_out")]
+DEAR = [(losses, "locate"), (multipliers, "friction_threshold"), (lipschitz, "work_out")]
 
 
 def once(compute: Callable[..., Any], shared: Shared) -> Callable[..., Any]:

@@ -32,7 +32,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
     },
     "for all of verification": {
-        "verification": "dense schemas spreadsheet value",
+        "verification": "dense registry schemas spreadsheet value",
         "verification.machine": "__init__ interrupts progress threads",
         "verification.show": "__init__ layout numbers parts",
     },
@@ -46,53 +46,51 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
         "verification.contact": "__init__ active_set kkt model step system",
     },
-    "constants": {
-        "verification.constants": "__init__ cells measured measuring operators",
-        "verification.certificate": "__init__ proved_constants exact_bodies",
-    },
+    "constants": {"verification.constants": "__init__ cells measured measuring operators"},
     "iteration": {
         "verification.algorithm": (
             "__init__ affine_piece ending fixed_point iterate linearisation monolithic rates reference relaxation "
             "remedy runs start theta"
         )
     },
-    "runs over grids": {"verification.sweeps": "__init__ cluster course export grid identity row store sweep workers"},
-    "bounds, proofs": {
-        "verification.bounds": "__init__ bound table",
-        "verification.semidefinite": (
-            "__init__ conditions interior_point lipschitz losses mirror model multipliers neighbours pattern_search "
-            "slip_errors trace_forms"
-        ),
-        "verification.certificate": "calibrating check claims continuum contraction",
-        "verification.sweeps": "region",
+    "bounds": {"verification.bounds": "__init__ bound losses table verdicts"},
+    "answers": {"verification": "comparison", "verification.algorithm": "history"},
+    "sections of the core": {
+        "verification.sections": "__init__ answer bounds comparison constants history run setting"
     },
-    "answers": {
-        "verification": "comparison",
-        "verification.algorithm": "history",
-        "verification.bounds": "verdicts",
-        "verification.sweeps": "best_theta",
+    "proofs": {
+        "verification.semidefinite": (
+            "__init__ bound conditions interior_point lipschitz losses mirror model multipliers neighbours "
+            "pattern_search slip_errors trace_forms"
+        ),
+        "verification.certificate": (
+            "__init__ calibrating check claims continuum contraction exact_bodies proved_constants sections"
+        ),
+    },
+    "runs over grids": {
+        "verification.sweeps": (
+            "__init__ best_theta cluster course export grid identity region row sections store sweep workers"
+        )
+    },
+    "couplings": {
         "verification.coupling": (
             "__init__ accelerated cells driver ends from_logs from_matrices from_moduli from_runs from_vectors "
             "from_waves kinds kratos log_files log_lines matrix_files methods pace readings roles runs_with_friction "
-            "seen seen_moduli sides snippets spectrum"
-        ),
-        "verification.reproduce": "__init__ claims experiments readings refutation",
-        "verification.ledger": (
-            "__init__ cases convergence curves differences enclosures evidence experiments inequalities large_friction "
-            "rational_pairs record rows sheets solutions sources weak_forms worst"
-        ),
-    },
-    "pages that move": {"verification.exploration": "__init__ film javascript page"},
-    "parts of results": {
-        "verification.show": (
-            "advice answer bounds certificate comparison constants exploration history ledger of_results reproduction "
-            "run setting sweep"
+            "sections seen seen_moduli sides snippets spectrum"
         )
     },
+    "the paper": {
+        "verification.reproduce": "__init__ claims experiments readings refutation sections",
+        "verification.ledger": (
+            "__init__ cases convergence curves differences enclosures evidence experiments inequalities large_friction "
+            "rational_pairs rows sections sheets solutions sources weak_forms worst"
+        ),
+    },
+    "pages that move": {"verification.exploration": "__init__ film javascript page sections"},
     "figures": {
         "verification.figures": (
-            "__init__ best_theta bodies factor history layers of_results proof_map region reproduction residuals "
-            "squares style sweep waterfall"
+            "__init__ best_theta bodies factor history layers proof_map region reproduction residuals roles squares "
+            "style sweep waterfall"
         )
     },
     "files": {"verification.output": "__init__ fields files folder inputs report"},
@@ -109,36 +107,32 @@ FLOORS: dict[str, dict[str, str]] = {
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
     "fem1d2d": 4750,
-    "ndtheory": 6550,
-    "verification": 1200,
+    "ndtheory": 6600,
+    "verification": 1350,
     "verification.algorithm": 3550,
-    "verification.bounds": 900,
-    "verification.certificate": 2300,
+    "verification.bounds": 850,
+    "verification.certificate": 2500,
     "verification.cli": 3000,
     "verification.constants": 1100,
     "verification.contact": 1100,
-    "verification.coupling": 7350,
-    "verification.exploration": 800,
+    "verification.coupling": 8100,
+    "verification.exploration": 850,
     "verification.figures": 1850,
     "verification.interface": 4150,
-    "verification.ledger": 4950,
+    "verification.ledger": 5050,
     "verification.machine": 300,
     "verification.output": 700,
     "verification.problem": 2550,
-    "verification.reproduce": 750,
-    "verification.semidefinite": 3300,
-    "verification.show": 2900,
-    "verification.sweeps": 3150,
+    "verification.reproduce": 800,
+    "verification.sections": 1000,
+    "verification.semidefinite": 3400,
+    "verification.show": 450,
+    "verification.sweeps": 3250,
     "verification.testing": 1750,
 }
 
-#: Imports by name that go upwards, and why.
-BY_NAME = {
-    ("verification.document", "verification.figures.of_results"): "a figure knows the types of results",
-    ("verification.document", "verification.show.of_results"): "so does what is shown of them",
-    ("verification.problem.reading", "verification.interface.friction"): "laws act on what is made from problems",
-    ("verification.problem.reading", "verification.algorithm.relaxation"): "rules act on what is made from problems",
-}
+#: Floors of the core, which the mission needs; what stands above is a wing, and the core imports none.
+CORE = tuple(FLOORS)[: tuple(FLOORS).index("proofs")]
 
 #: Imports inside functions: who, what, and why not at the top of the module.
 INSIDE = (
@@ -150,7 +144,7 @@ INSIDE = (
     ("verification.cli.main", "fem1d2d", "the command starts without arrays"),
     ("verification.cli.console", "rich", "only progress needs it"),
     ("verification.cli.console", "ctypes", "only diverting a stream needs it"),
-    ("verification.bounds.table", "verification.semidefinite", "the calculator has bounds and no arrays"),
+    ("verification.semidefinite.bound", "verification.semidefinite", "the calculator has bounds and no arrays"),
     ("verification.ledger.rows", "verification.ledger.sources", "records are read without sympy, which takes a second"),
     ("verification.output.folder", "verification.figures", "matplotlib is loaded once there is something to draw"),
     ("verification.output.fields", "meshio", "half a second; only a folder needs it"),
@@ -235,20 +229,19 @@ def levels(floors: Mapping[str, Mapping[str, str]]) -> dict[str, int]:
 
 
 def upward(found: list[Edge], level: Mapping[str, int]) -> list[str]:
-    """The imports that go up; those by name are another list."""
+    """The imports that go up, also for types."""
     return [
         f"{edge.module}:{edge.line}: imports {edge.imported}, which stands above it"
         for edge in found
-        if edge.kind != "name" and edge.imported in level and level[edge.imported] > level[edge.module]
+        if edge.imported in level and level[edge.imported] > level[edge.module]
     ]
 
 
 def circle(found: list[Edge]) -> list[str]:
-    """Modules that import each other in a circle, however; empty where there is none."""
+    """Modules that import each other in a circle, also by name or for types; empty where there is none."""
     graph: dict[str, set[str]] = {}
     for edge in found:
-        if edge.kind != "name":
-            graph.setdefault(edge.module, set()).add(edge.imported)
+        graph.setdefault(edge.module, set()).add(edge.imported)
     try:
         graphlib.TopologicalSorter(graph).prepare()
     except graphlib.CycleError as error:
@@ -302,11 +295,14 @@ def test_no_import_closes_a_circle(ours):
     assert circle(ours) == []
 
 
-def test_what_is_imported_by_name_is_listed_and_above(ours):
-    level = levels(FLOORS)
-    named = {(edge.module, edge.imported) for edge in ours if edge.kind == "name"}
-    assert named == set(BY_NAME)
-    assert [pair for pair in BY_NAME if level[pair[1]] <= level[pair[0]]] == []
+def test_only_the_face_of_the_package_imports_by_name(ours):
+    assert {edge.module for edge in ours if edge.kind == "name"} <= {"verification"}
+
+
+def test_the_core_imports_no_wing(ours):
+    wings = {module for module, floor in levels(FLOORS).items() if floor >= len(CORE)}
+    crossing = [edge for edge in ours if edge.module not in wings and edge.imported in wings]
+    assert crossing == []
 
 
 def test_imports_inside_functions_are_those_of_the_list(ours):

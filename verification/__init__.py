@@ -16,6 +16,8 @@ from __future__ import annotations
 
 import importlib
 
+from verification import registry
+
 TYPE_CHECKING = False  # as typing has it, which takes longer to import than all the rest
 
 #: Must equal ndtheory.__version__: `ndtheory.foreign_verification` looks for it, as another distribution has this name.
@@ -122,3 +124,50 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return __all__
+
+
+#: The modules that fill each table of :mod:`verification.registry`: all entries under "", or what is shown of the
+#: classes of a module.
+FILLS: dict[str, dict[str, tuple[str, ...]]] = {
+    "laws": {"": ("interface.friction",)},
+    "rules": {"": ("algorithm.relaxation",)},
+    "bounds": {"": ("bounds.table", "semidefinite.bound")},
+    "proofs": {"": ("certificate.proved_constants", "semidefinite.losses")},
+    "sections": {
+        "algorithm.history": ("sections.history",),
+        "algorithm.monolithic": ("sections.run",),
+        "algorithm.runs": ("sections.run",),
+        "bounds.table": ("sections.bounds",),
+        "certificate.continuum": ("certificate.sections",),
+        "certificate.contraction": ("certificate.sections",),
+        "comparison": ("sections.comparison",),
+        "constants.measured": ("sections.constants",),
+        "coupling.roles": ("coupling.sections",),
+        "exploration.page": ("exploration.sections",),
+        "ledger.rows": ("ledger.sections",),
+        "reproduce.experiments": ("reproduce.sections",),
+        "sweeps.region": ("sweeps.sections",),
+        "sweeps.store": ("sweeps.sections",),
+        "sweeps.sweep": ("sweeps.sections",),
+    },
+    "figures": {
+        "algorithm.history": ("figures.history",),
+        "algorithm.monolithic": ("figures.bodies",),
+        "algorithm.runs": ("figures.residuals",),
+        "bounds.table": ("figures.squares",),
+        "comparison": ("figures.residuals",),
+        "constants.measured": ("figures.factor",),
+        "coupling.roles": ("figures.roles",),
+        "reproduce.experiments": ("figures.reproduction",),
+        "sweeps.region": ("figures.region",),
+        "sweeps.sweep": ("figures.sweep",),
+    },
+}
+
+
+def _load(table: str, name: str) -> None:
+    for module in FILLS[table].get(name, ()):
+        importlib.import_module(f"verification.{module}")
+
+
+registry.load = _load

@@ -14,9 +14,9 @@ from verification.algorithm.reference import Reference, by_cvxpy_alone
 from verification.algorithm.relaxation import Constant
 from verification.algorithm.runs import Run, check_memory, run
 from verification.algorithm.theta import Choice, begin
-from verification.bounds import LARGEST
 from verification.bounds.bound import NOT_ASKED, BoundResult, Subject
-from verification.bounds.table import BOUNDS, chosen, named
+from verification.bounds.losses import Losses
+from verification.bounds.table import chosen, named
 from verification.bounds.verdicts import Judgement, judge_bound, judge_forecast
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
@@ -26,7 +26,7 @@ from verification.interface.pair import ContactPair
 from verification.machine.interrupts import INTERRUPTED
 from verification.machine.progress import Progress, silent
 from verification.problem import Problem
-from verification.semidefinite.losses import Losses, locate
+from verification.registry import BOUNDS, PROOFS
 
 T = TypeVar("T")
 
@@ -191,7 +191,7 @@ def compare(
         Prove bounds of the constants for the exact data of the problem, of what follows from them, and the factor that
         one semidefinite program gives.  What could not be proved keeps the level ``float``.
     bounds : sequence of str, optional
-        Names of :data:`verification.bounds.table.BOUNDS`; all by default.  The others are ``NOT_COMPUTED``.  Unless one
+        Names of :data:`verification.registry.BOUNDS`; all by default.  The others are ``NOT_COMPUTED``.  Unless one
         of the names needs the matrices of the bodies, as the semidefinite bound does, a comparison costs little more
         than its run: the other slow parts, ``losses`` and ``cvxpy``, are left out, too.
     watch : callable
@@ -252,7 +252,7 @@ def compare(
         progress("repeating the run by cvxpy alone", None)
         reference = left.work(lambda: _reference(finished), reference)
         left.tell(listener.cvxpy, *reference)
-        lost = left.work(lambda: _losses(pair, measured, progress), lost)
+        lost = left.work(lambda: PROOFS["losses"].of(pair, measured, progress=progress), lost)
         left.tell(listener.losses, *lost)
         for name in programs:
             evaluate = BOUNDS[name].evaluate
@@ -313,11 +313,3 @@ def _reference(finished: Run) -> tuple[Reference | None, str]:
         return by_cvxpy_alone(finished), ""
     except ContactError as error:
         return None, str(error)
-
-
-def _losses(pair: ContactPair, measured: Measured, progress: Progress) -> tuple[Losses | None, str]:
-    """Locate the losses of each inequality, or return why that was not done."""
-    if pair.contact.grid.n > LARGEST:
-        return None, f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
-    found = locate(pair, measured, progress=progress)
-    return found, "" if found is not None else measured.why_no_constants or "a contact node is held"

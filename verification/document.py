@@ -1,19 +1,15 @@
-"""Results as JSON documents, as one line, as sections and as figures.
-
-The modules that show a result are imported by name, and only here: they depend on the types of results, and not
-conversely.
-"""
+"""Results as JSON documents, as one line, as sections and as figures."""
 
 from __future__ import annotations
 
 import html
-import importlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import __version__
+from verification import registry
 from verification.show.layout import text
 from verification.show.parts import Section
 from verification.value import Value
@@ -64,8 +60,8 @@ class Document(Value, ABC):
         one place has that in ``only``.  There are none where only the document is shown, as for matrices without a
         problem.
         """
-        found: tuple[Section, ...] = importlib.import_module("verification.show.of_results").of(self)
-        return found
+        registry.of_class("sections", self)
+        return registry.sections(self)
 
     def _repr_html_(self) -> str:
         """Return the notebook view: its sections, or the document where there are none."""
@@ -83,5 +79,6 @@ class Document(Value, ABC):
 
     def drawn(self, **options: Any) -> Figure:
         """Draw the main figure, with the options that the figure of this type takes."""
-        figure: Figure = importlib.import_module("verification.figures.of_results").draw(self, **options)
+        registry.of_class("figures", self)
+        figure: Figure = registry.draw(self, **options)
         return figure

@@ -2,7 +2,7 @@
 
 import pytest
 
-from verification.bounds.table import BOUNDS
+from verification.registry import BOUNDS
 
 KNOWN = ", ".join(BOUNDS)
 

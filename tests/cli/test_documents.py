@@ -9,8 +9,8 @@ import pytest
 
 import ndtheory
 import verification as vf
-from verification.bounds.table import BOUNDS as TABLE
 from verification.cli.problems import examples
+from verification.registry import BOUNDS as TABLE
 
 NUMBER = {"value", "lo", "hi", "level"}
 LEVELS = {"exact", "verified", "guaranteed", "float"}

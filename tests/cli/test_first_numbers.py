@@ -12,7 +12,7 @@ import verification as vf
 from verification import comparison
 from verification.cli import main
 from verification.contact import ContactError
-from verification.semidefinite import lipschitz
+from verification.semidefinite import lipschitz, losses
 
 #: Says on the same stdout when something slow begins, unbuffered: the order of its lines is what a reader sees.  The
 #: process ends where figures begin, so that what was not written by then is never written.
@@ -45,7 +45,7 @@ MARKED = """
 
         setattr(module, name, begun)
 
-    for module, name in ((comparison, "run"), (comparison, "locate"), (lipschitz, "work_out")):
+    for module, name in ((comparison, "run"), (losses, "locate"), (lipschitz, "work_out")):
         marked(module, name)
     sys.exit(main())
 """
@@ -86,7 +86,7 @@ def test_a_document_is_written_last_and_alone(write, capfd, monkeypatch):
 
         return begun
 
-    for module, name in ((comparison, "run"), (comparison, "locate"), (lipschitz, "work_out")):
+    for module, name in ((comparison, "run"), (losses, "locate"), (lipschitz, "work_out")):
         monkeypatch.setattr(module, name, marked(name, getattr(module, name)))
     status = main(["compare", str(write()), "--json"])
     os.close(out)
@@ -148,7 +148,7 @@ def fail(*args, **options):
 
 def test_ctrl_c_after_the_first_tables_leaves_them_and_says_what_is_missing(call, write, monkeypatch):
     whole = call("compare", write()).out
-    monkeypatch.setattr(comparison, "locate", interrupt)
+    monkeypatch.setattr("verification.semidefinite.losses.locate", interrupt)
     answer = call("compare", write())
     assert answer.status == 130
     assert answer.err.startswith("interrupted after the run had ended (converged), ")

@@ -152,7 +152,7 @@ SOLVING = """
 
     def prepared(*args, **options):
         from verification import comparison
-        from verification.bounds.table import BOUNDS
+        from verification.registry import BOUNDS
         from verification.contact import ContactError
 
         def none(run):
@@ -328,7 +328,7 @@ def test_region_draws_the_runs_that_were_made(call, quick, write, tmp_path, monk
 
     monkeypatch.setattr(plane, "THETAS", (0.2, 0.4))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1, 0.3))
-    monkeypatch.setattr("verification.bounds.table.LARGEST", 0)  # without the semidefinite bound
+    monkeypatch.setattr("verification.semidefinite.bound.LARGEST", 0)  # without the semidefinite bound
     row, rows = workers.row, []
 
     def interrupt(*args):

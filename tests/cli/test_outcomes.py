@@ -16,7 +16,7 @@ from verification.bounds import verdicts
 from verification.bounds.verdicts import Judgement
 from verification.cli.problems import examples
 from verification.contact import ContactError
-from verification.show.comparison import NAMES, WORDS
+from verification.sections.comparison import NAMES, WORDS
 
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
 

@@ -14,8 +14,9 @@ import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
 from verification.bounds import bound as base
 from verification.bounds.bound import NotComputed, Subject
-from verification.bounds.table import BOUNDS, SemidefiniteBound
 from verification.cli.problems import examples
+from verification.registry import BOUNDS
+from verification.semidefinite.bound import SemidefiniteBound
 from verification.semidefinite.multipliers import QuadraticForms
 from verification.sweeps import region as plane
 from verification.sweeps import workers

@@ -3,9 +3,7 @@
 import pytest
 from made_up import Cautious, Exponential, Finding, Halfway, TooGood
 
-from verification.algorithm.relaxation import RULES
-from verification.bounds.table import BOUNDS
-from verification.interface.friction import LAWS
+from verification.registry import BOUNDS, LAWS, RULES
 
 
 @pytest.mark.parametrize(

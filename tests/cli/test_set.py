@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from verification.algorithm.relaxation import RULES
+from verification.registry import RULES
 
 #: Commands that take a problem file, and what else they need.
 COMMANDS = {"constants": [], "run": [], "compare": [], "solve": [], "advise": [], "region": ["-o", "plane.svg"]}

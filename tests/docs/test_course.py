@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from ndtheory.statements import recorded
 from verification.ledger import quote
-from verification.ledger.record import recorded
 from verification.ledger.sheets import WORDS
 
 DOCS = Path(__file__).parents[2] / "docs"

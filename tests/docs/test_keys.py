@@ -21,9 +21,9 @@ from made_up import Halfway
 
 import verification as vf
 from verification import figures, schemas
-from verification.bounds.table import BOUNDS
 from verification.certificate.continuum import certify_continuum
 from verification.cli import main
+from verification.registry import BOUNDS
 from verification.reproduce import READINGS, reproduce
 from verification.sweeps import region as plane
 

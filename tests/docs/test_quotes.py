@@ -8,7 +8,7 @@ from processes import sites
 
 from ndtheory.statements import statements
 from verification.ledger import quote, record
-from verification.show.ledger import plain
+from verification.ledger.sections import plain
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "examples").glob("*.md")), ROOT / "README.md"]

@@ -18,7 +18,7 @@ import verification as vf
 from ndtheory.energy_norms import predicted_factor
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.bounds.bound import Subject
-from verification.bounds.table import BOUNDS
+from verification.registry import BOUNDS
 
 DOCS = Path(__file__).parents[2] / "docs"
 

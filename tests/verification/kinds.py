@@ -7,13 +7,13 @@ from problem_list import plates
 
 import verification as vf
 from ndtheory import Constants, EnergyConstants
-from ndtheory.statements import statements
+from ndtheory.statements import recorded, statements
 from verification.bounds.bound import Region, Subject
-from verification.bounds.table import BOUNDS, Calculated
+from verification.bounds.table import Calculated
 from verification.certificate.continuum import certify_continuum
 from verification.ledger.evidence import Evidence
-from verification.ledger.record import recorded
 from verification.ledger.rows import Row
+from verification.registry import BOUNDS
 from verification.reproduce import reproduce
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.region import Plane, Point

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from verification.algorithm.relaxation import RULES
+from verification.registry import RULES
 
 
 class Linear:

@@ -11,12 +11,13 @@ from problem_list import changed
 
 import verification as vf
 from ndtheory import EnergyConstants, evaluate_energy
-from verification.algorithm.relaxation import RULES, Constant
+from verification.algorithm.relaxation import Constant
 from verification.algorithm.theta import automatic, choose, energy_bounds
 from verification.cli.problems import examples, load_problem
 from verification.coupling.from_matrices import advise_matrices
 from verification.interface.pair import pair_from
 from verification.problem import ProblemError
+from verification.registry import RULES
 
 
 def steps(theta, rho, tolerance=1e-9):

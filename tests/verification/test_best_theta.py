@@ -6,9 +6,9 @@ import pytest
 import verification as vf
 from ndtheory import evaluate_energy
 from verification.bounds.bound import Subject
-from verification.bounds.table import BOUNDS
 from verification.figures.best_theta import Panel, draw_best_theta
 from verification.figures.sweep import draw_rules
+from verification.registry import BOUNDS
 from verification.semidefinite.multipliers import QuadraticForms
 from verification.sweeps.best_theta import Fewest, best_theta
 

@@ -17,11 +17,11 @@ from processes import environment
 
 import verification as vf
 from verification.bounds.bound import Subject
-from verification.bounds.table import BOUNDS
 from verification.certificate import check, claims
 from verification.certificate.claims import FEWEST, LEFT, Claims, NoCertificate, describe
 from verification.certificate.contraction import certify, check_again
 from verification.machine.progress import silent
+from verification.registry import BOUNDS
 from verification.semidefinite.lipschitz import enclose
 from verification.semidefinite.multipliers import QuadraticForms
 

@@ -7,7 +7,8 @@ from problem_list import small
 import verification as vf
 from verification import comparison
 from verification.bounds.bound import NOT_ASKED
-from verification.bounds.table import BOUNDS, chosen
+from verification.bounds.table import chosen
+from verification.registry import BOUNDS, PROOFS, Prover
 
 PROBLEM = vf.Problem.from_dict(small())
 QUICK = ("printed", "repaired", "energy")
@@ -25,9 +26,10 @@ def worked_out(monkeypatch):
             return before(self, *args, **options)
 
         monkeypatch.setattr(kind, "evaluate", evaluate)
-    for name in ("_reference", "_losses"):
-        part = getattr(comparison, name)
-        monkeypatch.setattr(comparison, name, lambda *args, n=name, part=part: seen.append(n) or part(*args))
+    reference, losses = comparison.by_cvxpy_alone, PROOFS["losses"].of
+    made = lambda *args, **given: seen.append("losses") or losses(*args, **given)
+    monkeypatch.setattr(comparison, "by_cvxpy_alone", lambda run: seen.append("reference") or reference(run))
+    monkeypatch.setitem(PROOFS, "losses", Prover("losses", made))
     return seen
 
 
@@ -73,7 +75,7 @@ def test_what_was_asked_for_is_what_a_whole_comparison_has(worked_out):
 
 def test_a_bound_that_takes_the_matrices_brings_what_takes_long(worked_out):
     found = vf.compare(PROBLEM, bounds=["lmi"])
-    assert worked_out == ["_reference", "_losses", "lmi"]
+    assert worked_out == ["reference", "losses", "lmi"]
     assert found.losses is not None
     assert found.cvxpy is not None
     assert found.bounds["energy"].not_computed == NOT_ASKED

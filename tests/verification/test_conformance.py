@@ -11,11 +11,12 @@ from strategies import AT_NIGHT
 import verification as vf
 from ndtheory import Number
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.algorithm.relaxation import RULES, Momentum, Rule, momentum_rate
+from verification.algorithm.relaxation import Momentum, Rule, momentum_rate
 from verification.bounds.bound import Subject
-from verification.bounds.table import BOUNDS, Energy
-from verification.interface.friction import LAWS, Local, Nonlocal, hat
+from verification.bounds.table import Energy
+from verification.interface.friction import Local, Nonlocal, hat
 from verification.interface.interface import Law
+from verification.registry import BOUNDS, LAWS, RULES
 from verification.semidefinite.pattern_search import largest_factor
 from verification.testing import (
     Refused,

@@ -13,10 +13,10 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification.bounds.bound import Region
-from verification.bounds.table import BOUNDS
 from verification.cli.problems import examples
 from verification.figures import draw_bodies, draw_residuals, save
 from verification.figures.style import OUTCOMES, RAISED, new_figure
+from verification.registry import BOUNDS
 from verification.sweeps.region import Plane, Point
 
 LOWERED = {raised: plain for plain, raised in RAISED.items()}

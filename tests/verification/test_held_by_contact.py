@@ -16,9 +16,9 @@ from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.monolithic import solution_force
 from verification.bounds.bound import NotComputed, Subject
-from verification.bounds.table import BOUNDS
 from verification.contact import ContactError, ContactStep
 from verification.interface.files import write_interface
+from verification.registry import BOUNDS
 
 SLIDING_TOP = {"prescribed": {"top": ["free", "-0.015"]}}
 PRESSED = {"prescribed": None, "traction": {"top": [0, -3000]}}

@@ -9,8 +9,8 @@ import verification as vf
 from fem1d2d import stiffness
 from verification.algorithm.history import steps_to
 from verification.algorithm.rates import noise
-from verification.bounds.table import BOUNDS
 from verification.problem.steps import at_rest
+from verification.registry import BOUNDS
 
 
 def problem(path=PATH, times=1, **tables):

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import verification as vf
 from verification.algorithm.fixed_point import RENEWED, FixedPointMap, iterate_at, iterates
 from verification.algorithm.rates import noise
-from verification.algorithm.relaxation import RULES, Constant
+from verification.algorithm.relaxation import Constant
 from verification.contact import ContactError, active_set
 from verification.contact.active_set import ActiveSet, Pattern
 from verification.contact.kkt import KKTCertificate
@@ -24,6 +24,7 @@ from verification.dense import Cholesky, times, worst
 from verification.interface import body
 from verification.interface.body import Condensed
 from verification.machine.threads import one_thread
+from verification.registry import RULES
 
 EPS = np.finfo(float).eps
 

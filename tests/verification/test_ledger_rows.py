@@ -4,13 +4,12 @@ import itertools
 
 import pytest
 
-from ndtheory.statements import statements
+from ndtheory.statements import recorded, statements
 from ndtheory.symbolic.checks import checks
 from ndtheory.symbolic.engine import Check, equal
 from verification.ledger import Evidence
 from verification.ledger.evidence import METHODS, settle
 from verification.ledger.inequalities import INEQUALITIES
-from verification.ledger.record import recorded
 from verification.ledger.sources import exact
 
 OF = ("printed", "step", "repaired")

@@ -25,7 +25,6 @@ from verification.ledger import cases, weak_forms
 from verification.ledger.solutions import solutions
 from verification.problem import ProblemError
 from verification.show.layout import text
-from verification.show.of_results import of
 
 #: Documents of one problem in two positions agree up to this: rounding, and what conditions make of it.
 ROTATED = 1e-9
@@ -400,7 +399,7 @@ def test_a_pin_that_only_its_groove_holds_feels_no_force_sideways(friction):
 
 
 def test_the_screen_names_bodies_by_number_and_shows_the_force_along_both_axes():
-    shown = text(of(vf.solve(PIN)))
+    shown = text(vf.solve(PIN).sections())
     assert "Neumann body: 1 |" in shown
     assert "23 nodes of body 2, Neumann grid: 19 of body 1" in shown
     assert re.search(r"on body 2 +-13.62\d+ along x, 183.5\d+ along y", shown)

@@ -21,10 +21,11 @@ from scipy.linalg import eigh
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, bounds
 from verification.algorithm.affine_piece import Piece
+from verification.bounds.losses import Losses
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.differences import uniform_piece
-from verification.semidefinite.losses import Losses, locate
+from verification.semidefinite.losses import locate
 from verification.semidefinite.neighbours import squared
 from verification.semidefinite.pattern_search import FoundFactor, worst_piece
 

@@ -18,8 +18,8 @@ from ndtheory.moduli import Moduli, half_planes
 from verification.certificate.claims import describe
 from verification.certificate.continuum import certify_continuum
 from verification.certificate.contraction import certify, check_again
+from verification.sections.setting import setting
 from verification.show.layout import text
-from verification.show.setting import setting
 from verification.testing.strategies import decimals
 
 ratios = st.integers(-49, 50).map(lambda i: F(i, 100))

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import verification as vf
-from verification.interface.friction import LAWS, Local
+from verification.interface.friction import Local
+from verification.registry import LAWS
 
 PLANE = vf.example("section6")
 BARS = vf.example("two-bars")

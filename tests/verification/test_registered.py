@@ -6,10 +6,9 @@ from problem_list import small
 
 import verification as vf
 from verification import figures
-from verification.algorithm.relaxation import RULES
-from verification.bounds.table import BOUNDS, certifying
-from verification.interface.friction import LAWS
+from verification.bounds.table import certifying
 from verification.output.folder import Folder
+from verification.registry import BOUNDS, LAWS, RULES
 from verification.sweeps import region
 from verification.sweeps.grid import SweepGrid
 

@@ -21,11 +21,12 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap, iterates
-from verification.algorithm.relaxation import RULES, Momentum, momentum_rate, momentum_step
+from verification.algorithm.relaxation import Momentum, momentum_rate, momentum_step
 from verification.algorithm.runs import Run, run
 from verification.constants import Measured, measure
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair, pair_from
+from verification.registry import RULES
 
 #: Who has the Neumann problem, E1, E2, and the left end of the upper body.
 COMBINATIONS = {

@@ -5,7 +5,7 @@ from problem_list import plates
 
 import verification as vf
 from verification.bounds.bound import Bound, BoundResult, Thresholds
-from verification.bounds.table import BOUNDS
+from verification.registry import BOUNDS
 from verification.show.layout import text
 
 

@@ -18,11 +18,10 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification import figures
 from verification.bounds.verdicts import RunVerdict
-from verification.ledger.record import on_the_printed_proof
 from verification.output.folder import Folder
 from verification.output.report import report
-from verification.show.bounds import thetas
-from verification.show.comparison import NAMES, WORDS
+from verification.sections.bounds import on_the_printed_proof, thetas
+from verification.sections.comparison import NAMES, WORDS
 from verification.show.layout import text
 
 ROOT = Path(__file__).parents[2]

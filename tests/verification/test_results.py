@@ -14,7 +14,7 @@ import verification as vf
 from verification.algorithm.affine_piece import piece_of
 from verification.bounds.bound import Region
 from verification.document import Document
-from verification.figures.of_results import draw
+from verification.registry import draw
 from verification.sweeps.region import Plane, Point
 
 SMALL = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}

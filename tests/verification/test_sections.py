@@ -12,15 +12,15 @@ from processes import ended
 
 import verification as vf
 from ndtheory import Number
+from verification import FILLS, registry
 from verification.bounds.bound import Bound, BoundResult, Thresholds
-from verification.bounds.table import BOUNDS
 from verification.cli import main
 from verification.document import Document
 from verification.output.report import report
-from verification.show import comparison as of_comparison
+from verification.registry import BOUNDS
+from verification.sections import comparison as of_comparison
 from verification.show import numbers
 from verification.show.layout import lines, text
-from verification.show.of_results import of
 from verification.show.parts import (
     Block,
     Facts,
@@ -86,7 +86,11 @@ def texts(each: Section) -> list[str]:
 
 
 def test_every_kind_of_result_that_has_sections_is_among_these(results):
-    assert {kind for kind in of.registry if kind is not object} == {type(result) for result in results.values()}
+    for result in results.values():
+        result.sections()
+    known = {kind for kind in registry.sections.registry if kind is not object}
+    assert known == {type(result) for result in results.values()}
+    assert {kind.__module__.removeprefix("verification.") for kind in known} == set(FILLS["sections"])
 
 
 def test_a_terminal_and_a_notebook_show_every_title_and_every_number(results):
@@ -204,7 +208,7 @@ def test_a_title_that_is_renamed_in_its_one_place_is_renamed_everywhere(results,
     assert source.count(old) == 1
     before = page_words(report(result, {"residuals": "<svg></svg>"})), page_words(result._repr_html_())
     scope: dict = {"__name__": of_comparison.__name__}
-    exec(compile(source.replace(old, new).replace("@of.register", ""), str(places[0]), "exec"), scope)
+    exec(compile(source.replace(old, new).replace("@registry.sections.register", ""), str(places[0]), "exec"), scope)
     monkeypatch.setattr(of_comparison.verdicts, "__code__", scope["verdicts"].__code__)
     after = page_words(report(result, {"residuals": "<svg></svg>"})), page_words(result._repr_html_())
     assert after == (before[0].replace(old.capitalize(), new.capitalize()), before[1].replace(old, new))
@@ -216,13 +220,14 @@ def test_a_title_that_is_renamed_in_its_one_place_is_renamed_everywhere(results,
 
 
 def test_no_module_of_sections_names_a_bound():
-    found = [(path.name, text) for path in (ROOT / "sections").glob("*.py") for text in strings(path) if text in BOUNDS]
+    found = [(path.name, text) for path in ROOT.rglob("sections*/*.py") for text in strings(path) if text in BOUNDS]
     assert found == []
 
 
 def test_sections_are_made_without_a_terminal_a_browser_and_a_figure():
     heavy = ["click", "rich", "matplotlib", "jinja2", "verification.cli", "verification.figures", "verification.output"]
-    code = f"import sys, verification.show.of_results; print([name for name in {heavy} if name in sys.modules])"
+    modules = sorted({f"verification.{name}" for names in FILLS["sections"].values() for name in names})
+    code = f"import sys, {', '.join(modules)}; print([name for name in {heavy} if name in sys.modules])"
     done = ended(code)
     assert done.stdout.strip() == "[]"
 
@@ -286,7 +291,7 @@ class Storm(Weather):
 def test_a_kind_of_result_without_sections_is_shown_as_its_document_and_may_register_its_own():
     assert Weather().sections() == ()
     assert "test.weather/1" in Weather()._repr_html_()
-    of.register(Storm, lambda found: (section("sky", "HOW IS THE SKY?", found.schema),))
+    registry.sections.register(Storm, lambda found: (section("sky", "HOW IS THE SKY?", found.schema),))
     assert text(Storm().sections()) == "\nHOW IS THE SKY?\n  test.weather/1"
 
 

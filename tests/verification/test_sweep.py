@@ -17,10 +17,10 @@ from strategies import AT_NIGHT
 import verification as vf
 from ndtheory import evaluate_energy
 from verification.algorithm.linearisation import NotLinear
-from verification.algorithm.relaxation import RULES
 from verification.contact import ContactError, active_set
 from verification.contact.step import contact_model
 from verification.interface import body
+from verification.registry import RULES
 from verification.sweeps import course, grid, workers
 from verification.sweeps import row as of_rows
 from verification.sweeps.course import KnownPieces, Shelf

@@ -19,7 +19,6 @@ import verification as vf
 from ndtheory.number import exact
 from verification.algorithm.monolithic import solve
 from verification.bounds.bound import Subject, Thresholds
-from verification.bounds.table import BOUNDS
 from verification.certificate import check
 from verification.certificate.claims import describe, same
 from verification.certificate.continuum import certify_continuum
@@ -27,6 +26,7 @@ from verification.certificate.contraction import certify, check_again
 from verification.interface.build import build
 from verification.interface.files import write_interface
 from verification.problem.specs import Profile
+from verification.registry import BOUNDS
 from verification.show.layout import text
 from verification.sweeps.identity import Identity
 from verification.sweeps.sweep import sweep

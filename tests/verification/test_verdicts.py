@@ -15,15 +15,15 @@ import verification as vf
 from ndtheory import Number
 from verification.algorithm.linearisation import NotLinear, forecast
 from verification.algorithm.rates import StepRatio, largest_step_ratio
-from verification.bounds import LARGEST
 from verification.bounds.bound import Subject
-from verification.bounds.table import BOUNDS
 from verification.bounds.verdicts import TIGHT, judge, judge_bound, judge_forecast
 from verification.comparison import compare
 from verification.constants import measure
 from verification.interface.files import read_interface, write_interface
 from verification.interface.pair import pair_from
 from verification.ledger.cases import problem
+from verification.registry import BOUNDS
+from verification.semidefinite import LARGEST
 from verification.semidefinite.interior_point import LMIError
 from verification.semidefinite.multipliers import QuadraticForms
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 import verification as vf
 from ndtheory.texts import clean
-from verification.algorithm.relaxation import RULES
 from verification.cli.problems import examples
+from verification.registry import RULES
 
 BUILT_IN = {name: vf.example(name) for name in examples()}
 MESH = {"mesh": "body.msh", "young": 1, "poisson": "1/3", "fixed": ["under"]}

@@ -27,7 +27,7 @@ from verification.algorithm.runs import Run, check_memory, run_from
 from verification.algorithm.start import LEAST, Start, begin_at, tied_size
 from verification.algorithm.theta import choose
 from verification.bounds.bound import BoundResult, Subject
-from verification.bounds.table import BOUNDS, named
+from verification.bounds.table import named
 from verification.bounds.verdicts import Judgement, judge_bound
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
@@ -39,6 +39,7 @@ from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair, pair_from
 from verification.problem import Problem, load
 from verification.problem.steps import Moment, at_rest, moments
+from verification.registry import BOUNDS
 from verification.value import Value
 
 if TYPE_CHECKING:

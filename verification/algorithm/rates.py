@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -192,3 +193,10 @@ def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRa
         hi=max(float(hi[before >= level * error_before].max()), value),
         steps=len(begins),
     )
+
+
+def steps(rate: float, tolerance: float = 1e-9) -> int | None:
+    """Number of steps of a rate to a tolerance; None where no number is enough."""
+    if not 0 < rate < 1:
+        return 1 if rate == 0 else None
+    return math.ceil(math.log(tolerance) / math.log(rate))

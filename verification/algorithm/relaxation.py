@@ -23,6 +23,7 @@ from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.iterate import Iterate
 from verification.contact.active_set import SLACK
 from verification.interface.pair import ContactPair
+from verification.registry import RULES
 
 #: Number of earlier steps that Anderson mixing uses.
 DEPTH = 10
@@ -364,10 +365,7 @@ def momentum_step(rho: float) -> float:
     return (1 + momentum_rate(rho)) / (1 + rho)
 
 
-#: The rules of problem files, by name.
-RULES: dict[str, Rule] = {
-    rule.name: rule for rule in (Constant(), Aitken(), Anderson(), InverseLeastSquares(), Newton(), Momentum())
-}
+RULES.provide(Constant(), Aitken(), Anderson(), InverseLeastSquares(), Newton(), Momentum())
 
 
 def rule_of(rule: Rule | str | type) -> Rule:
@@ -387,4 +385,5 @@ def rule_of(rule: Rule | str | type) -> Rule:
         raise ValueError(f"rule {rule.__name__}: needed an object of this class, as {rule.__name__}()")
     if rule not in RULES:
         raise ValueError(f"relaxation {rule!r}: needed one of {', '.join(RULES)}, or a rule")
-    return RULES[rule]
+    found: Rule = RULES[rule]
+    return found

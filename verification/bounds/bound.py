@@ -1,7 +1,7 @@
 """Base of every bound on the factor of one step, and its result.
 
 Every bound, from the printed theorem to the semidefinite program, derives from :class:`Bound` and answers with a
-:class:`BoundResult`; tables, verdicts, regions, figures and reports loop over :data:`verification.bounds.table.BOUNDS`.
+:class:`BoundResult`; tables, verdicts, regions, figures and reports loop over :data:`verification.registry.BOUNDS`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ from verification.value import to_plain
 if TYPE_CHECKING:
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
-    from verification.semidefinite.lipschitz import Enclosure
-    from verification.semidefinite.multipliers import QuadraticForms
 
 #: The thetas between two values.
 Ends = tuple[float, float]
@@ -304,10 +302,11 @@ class Bound(ABC):
         """Remarks to print beside figures of this bound (beside a region ``result`` is None), in a unit of stress."""
         return ()
 
-    def enclose(
-        self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
-    ) -> Enclosure | None:
+    def enclose(self, pair: ContactPair, forms: Any, theta: float, *, exact: bool, progress: Progress) -> Any:
         """Enclose the factor by multipliers of this bound's own, for a certificate; None where it has none.
+
+        ``forms`` are :class:`verification.semidefinite.multipliers.QuadraticForms`, the enclosure is a
+        :class:`verification.semidefinite.lipschitz.Enclosure`.
 
         With ``exact``, which is asked only of a bound that ``divides``, as closely as it can.
 

@@ -1,31 +1,24 @@
-"""All bounds, from the weakest to the strongest: tables, verdicts, regions and reports loop over :data:`BOUNDS`."""
+"""The bounds that follow from constants, and the table of all bounds, from the weakest to the strongest."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import PRINTED, REPAIRED, Constants, EnergyConstants, Number, evaluate, evaluate_energy
 from ndtheory.bounds import Edition
 from ndtheory.constants import relaxation_factor
-from ndtheory.number import Numeric, below, weakest
+from ndtheory.number import Numeric, weakest
 from ndtheory.texts import did_you_mean
-from verification.bounds import LARGEST
-from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Removed, Subject, Thresholds, trace
+from verification.bounds.bound import Bound, BoundResult, Removed, Subject, Thresholds
 from verification.document import Document
 from verification.machine.progress import Progress, silent
+from verification.registry import BOUNDS
 from verification.value import to_plain
 
 if TYPE_CHECKING:
     from verification.constants import Measured
-    from verification.interface.pair import ContactPair
-    from verification.semidefinite.lipschitz import Enclosure
-    from verification.semidefinite.multipliers import QuadraticForms
-
-#: Friction values that trace the border of the region of the semidefinite bound, at most.
-TRACED = 25
 
 #: The constants that may be given to the calculator, for Section 5 and for the theorem in energy norms.
 SECTION_5, ENERGY = ("m", "M", "C_R", "C_s", "C_tr", "k", "C_K"), ("rho", "kappa_1", "kappa_2")
@@ -134,86 +127,6 @@ class Energy(Bound):
         return {self.name: document}
 
 
-class SemidefiniteBound(Bound):
-    """The factor proved by multipliers of the conditions of step II, up to LARGEST nodes; see ``docs/energy.md``."""
-
-    name, words = "lmi", "the semidefinite bound"
-    colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
-    calculated = False
-    attained = True  # without friction
-    apart = certifies = divides = True
-
-    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
-        if theta is None or subject.pair is None or subject.measured is None:
-            return self.absent("needed a pair of bodies and a theta")
-        if subject.pair.contact.grid.n > LARGEST:
-            return self.absent(f"{subject.pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
-        from verification.semidefinite.interior_point import LMIError
-        from verification.semidefinite.lipschitz import work_out
-
-        chosen = relaxation_factor(theta)
-        theta = float(chosen)
-        try:
-            found = work_out(subject.pair, subject.measured, theta, exact=subject.exact, progress=progress)
-        except (LMIError, ValueError) as error:
-            return self.absent(str(error))
-        if subject.measured.unverified is not None:  # proofs were asked for
-            found = found.proved(subject.pair, subject.measured, chosen, progress=progress)
-        factor, allowed, largest = found.factor, found.friction_threshold, found.theta_max
-        on = "k" if allowed is not None or subject.measured.C_t1 is None else "any"
-        return BoundResult(
-            name=self.name,
-            proved=True,
-            theta=theta,
-            factor=factor,
-            one_minus_factor=None if factor is None else _rest(factor),
-            interval=None if largest is None else (0.0, largest.value if largest.lo is None else largest.lo),
-            interval_level="float" if largest is None else largest.level,
-            friction=Thresholds(every=allowed, on=on),
-            why=found.why_no_factor,
-            not_computed=found.gave_up if factor is None else "",
-            detail=found,
-        )
-
-    def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
-        found = None if result is None else result.detail
-        if found is None:
-            return ()
-        said = [f"{self.name}: some loads reach a factor of {found.lower:.3f}, {found.gap:.2%} less"]
-        if found.divided is not None:
-            divided = f"dividing the pieces of T gives {found.divided.value:#.4g} in doubles"
-            said.append(f"{self.name}: proved is the factor of one program; {divided}")
-        if found.unverified is not None and not found.certified:
-            said.append(f"{self.name} is not proved: {found.not_proved}")
-        return tuple(said)
-
-    def enclose(
-        self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
-    ) -> Enclosure:
-        from verification.semidefinite.lipschitz import CERTIFIED, CLOSE, budget, enclose
-
-        programs = min(CERTIFIED, 20 * budget(pair.contact.grid.n)) if exact else 1
-        gap = CLOSE if exact else float("inf")
-        return enclose(pair, forms, theta, gap=gap, programs=programs, progress=progress)
-
-    def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
-        from verification.semidefinite.interior_point import LMIError
-        from verification.semidefinite.lipschitz import thetas
-
-        pair, measured = subject.pair, subject.measured
-        if pair is None or measured is None or measured.friction_threshold is None:
-            raise NotComputed("needed a pair of bodies with a law of friction")
-        if pair.contact.grid.n > LARGEST:
-            raise NotComputed(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
-        try:
-            last, largest = thetas(pair, measured, progress=progress)
-            interval = lambda k: None if (end := largest(k)) is None else (0.0, end)
-            k, theta = trace(interval, last, TRACED)
-        except (LMIError, ValueError) as error:
-            raise NotComputed(str(error)) from None
-        return Region(k=k, theta=theta, every=last, some=last)
-
-
 def _why_not(
     interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None, varies: bool
 ) -> str:
@@ -226,20 +139,7 @@ def _why_not(
     return f"friction {friction:g} is not below {scale:.2g}"
 
 
-def _rest(factor: Number) -> Number:
-    """1 minus a factor."""
-    if factor.hi is None:
-        return Number.of_float(1 - factor.value)
-    least = below(1 - Fraction(factor.hi))
-    return Number(value=max(1 - factor.value, least), lo=least, level=factor.level)
-
-
-#: The bounds by name, from the weakest to the strongest.  A bound that is put in here at any time is worked out,
-#: judged, shown and drawn with the others.
-BOUNDS: dict[str, Bound] = {bound.name: bound for bound in (Printed(), Repaired(), Energy(), SemidefiniteBound())}
-
-#: The bounds that this library brings along.
-OURS = tuple(BOUNDS)
+BOUNDS.provide(Printed(), Repaired(), Energy())
 
 
 def named(name: str) -> Bound:
@@ -255,7 +155,7 @@ def certifying() -> tuple[str, ...]:
 def strongest() -> str:
     """The bound that proposes a certificate where none is named: the last of our own, whatever is registered beside."""
     certify = certifying()
-    return ([name for name in OURS if name in certify] or certify)[-1]
+    return ([name for name in BOUNDS.ours if name in certify] or certify)[-1]
 
 
 def chosen(names: Sequence[str] | str | None) -> tuple[str, ...]:

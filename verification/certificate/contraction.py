@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
-from verification.bounds.table import BOUNDS, certifying, strongest
+from verification.bounds.table import certifying, strongest
 from verification.certificate import check
 from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, describe, same, written
 from verification.constants import Measured, measure
@@ -24,6 +24,7 @@ from verification.document import Document
 from verification.interface.pair import UNITS, ContactPair, pair_from
 from verification.machine.progress import Progress, silent
 from verification.problem import Problem, ProblemError, load
+from verification.registry import BOUNDS
 from verification.semidefinite.conditions import Conditions
 from verification.semidefinite.interior_point import LMIError
 from verification.semidefinite.lipschitz import Division, Leaf

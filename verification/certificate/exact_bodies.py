@@ -21,11 +21,12 @@ from fem1d2d.proofs import exact
 from fem1d2d.proofs.enclosed import UNIT, Enclosed, gamma, nearest
 from fem1d2d.proofs.exact import Shapes
 from verification.interface.body import Body, in_frames, material_of
-from verification.interface.friction import LAWS, Nonlocal
+from verification.interface.friction import Nonlocal
 from verification.interface.interface import Grid, Interface
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
+from verification.registry import LAWS
 
 
 class NotExact(ValueError):

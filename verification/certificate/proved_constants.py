@@ -35,6 +35,7 @@ from verification.interface.body import Name
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
+from verification.registry import PROOFS, Prover
 
 #: A form between two others in the order of symmetric matrices: from below and from above.
 Between = tuple[Enclosed, Enclosed]
@@ -360,3 +361,6 @@ def _least(A: Enclosed) -> float | None:
     least = 0.5 / float(np.linalg.norm(x))
     identity = Enclosed.exactly(sp.eye_array(A.middle.shape[0], format="csc"))
     return least if positive_definite(A.plus(-least, identity), elimination.order) else None
+
+
+PROOFS.provide(Prover("constants", verify))

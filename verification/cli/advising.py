@@ -444,8 +444,8 @@ def _no_document_of(snippets: str | None, as_json: bool) -> None:
 
 def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | None = None) -> None:
     """Show the advice, or the blocks to paste where they were asked for and a theta is advised."""
-    from verification.show.advice import sections
-    from verification.show.advice import snippets as blocks
+    from verification.coupling.sections import sections
+    from verification.coupling.sections import snippets as blocks
 
     if snippets is not None and found.theta is not None:
         deliver(found, lambda found: blocks(found, snippets), as_json)

@@ -10,10 +10,11 @@ import click
 from ndtheory import EDITIONS, Constants, EnergyConstants, HypothesisError
 from ndtheory.constants import take
 from verification.bounds.bound import NOT_ASKED, Subject
-from verification.bounds.table import BOUNDS, ENERGY, SECTION_5, Calculated, Energy, Section5
+from verification.bounds.table import ENERGY, SECTION_5, Calculated, Energy, Section5
 from verification.cli.console import deliver
 from verification.cli.options import OneOf, check_place, one_file
-from verification.show.bounds import sections
+from verification.registry import BOUNDS
+from verification.sections.bounds import sections
 
 #: The options by the constants that they give.
 OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}

@@ -99,8 +99,8 @@ def certify(
     assert file is not None
     from verification.certificate.claims import NoCertificate
     from verification.certificate.contraction import certify as prove
+    from verification.certificate.sections import sections
     from verification.output.files import writing
-    from verification.show.certificate import sections
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
@@ -120,8 +120,8 @@ def _prove_continuum(
     """Bound the continuous problem of a file and show what follows; 1 where contraction is not proved."""
     from ndtheory.continuum.strip import Unproved
     from verification.certificate.continuum import certify_continuum
+    from verification.certificate.sections import continuum
     from verification.output.files import writing
-    from verification.show.certificate import continuum
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
@@ -136,8 +136,8 @@ def _prove_continuum(
 
 def _check(path: Path, problem: Any, as_json: bool) -> int:
     from verification.certificate.contraction import check_again
+    from verification.certificate.sections import checked
     from verification.problem.tables import ProblemError, unreadable
-    from verification.show.certificate import checked
 
     if why := unreadable(path, MOST_BYTES):
         raise ProblemError(str(path), "", None, why)

@@ -31,8 +31,8 @@ def explore(file: Path, keys: dict[str, str], swap: bool, target: Path, as_json:
       ndtheory explore my.toml -o page.html
     """
     from verification.exploration import page
+    from verification.exploration.sections import sections
     from verification.output.files import staged
-    from verification.show.exploration import sections
 
     problem = load_problem(file, keys, swap=swap)
     check_place(target)

@@ -50,8 +50,8 @@ def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path |
             say(_draw(target, chosen, {}))
             return 0
     from verification.ledger import verify as check
+    from verification.ledger.sections import sections
     from verification.output.folder import Folder
-    from verification.show.ledger import sections
 
     write = None if folder is None else Folder(folder, "verify").write
     try:
@@ -70,9 +70,9 @@ def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path |
 
 def _draw(target: Path, ids: list[str], found: Mapping[str, str]) -> str:
     """Write the map of some statements, or of all, with verdicts over the recorded ones; return what is in it."""
+    from ndtheory.statements import recorded
     from verification import build, example, measure
     from verification.figures import draw_map
-    from verification.ledger.record import recorded
     from verification.output.files import staged
     from verification.semidefinite.losses import locate
 
@@ -130,7 +130,7 @@ def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | 
     from verification.output.folder import Folder
     from verification.reproduce import FIGURES
     from verification.reproduce import reproduce as run_again
-    from verification.show.reproduction import sections
+    from verification.reproduce.sections import sections
 
     write = None if folder is None else Folder(folder, "reproduce").write
     with stages() as tell:

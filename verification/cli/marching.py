@@ -43,7 +43,7 @@ def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bo
     from verification.algorithm import history
     from verification.algorithm.runs import Run
     from verification.output.folder import Folder
-    from verification.show.history import sections
+    from verification.sections.history import sections
 
     write = None if folder is None else Folder(folder, "march").write
     with stages() as tell:

@@ -65,7 +65,7 @@ class Registered(OneOf):
 
 
 def _rules() -> Sequence[str]:
-    from verification.algorithm.relaxation import RULES
+    from verification.registry import RULES
 
     return tuple(RULES)
 

@@ -136,7 +136,7 @@ def constants(file: Path, keys: dict[str, str], swap: bool, refine: int, verifie
       ndtheory constants my.toml --set body1.young=2e4
     """
     from verification.constants import measure
-    from verification.show.constants import sections
+    from verification.sections.constants import sections
 
     problem = load_problem(file, keys, swap=swap)
     with stages() as tell:
@@ -169,7 +169,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
     from verification.coupling.matrix_files import read_vector
     from verification.interface.pair import pair_from
     from verification.output.folder import Folder
-    from verification.show.run import sections
+    from verification.sections.run import sections
 
     write = None if folder is None else Folder(folder, "run").write
     pair = pair_from(problem)
@@ -207,7 +207,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
     from verification.algorithm import monolithic
     from verification.interface.assembly import discretise
     from verification.output.folder import Folder
-    from verification.show import run
+    from verification.sections import run
 
     problem = load_problem(file, keys)
     write = None if folder is None else Folder(folder, "solve").write
@@ -267,7 +267,7 @@ def compare(
       ndtheory compare my.toml --bounds printed,repaired,energy
     """
     if exact and bounds is not None:
-        from verification.bounds.table import BOUNDS
+        from verification.registry import BOUNDS
 
         if all(BOUNDS[name].calculated for name in bounds):
             needed = "needed a bound among them that can be brought closer"
@@ -311,8 +311,8 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
     from verification import comparison as verdicts
     from verification.interface.pair import pair_from
     from verification.output.folder import Folder
-    from verification.show.comparison import Parts
-    from verification.show.comparison import verdicts as end
+    from verification.sections.comparison import Parts
+    from verification.sections.comparison import verdicts as end
 
     write = None if folder is None else Folder(folder, "compare").write
     pair = pair_from(problem)

@@ -97,7 +97,7 @@ def sweep(
     """
     from verification.extras import require
     from verification.output.files import check_folder, check_ours
-    from verification.show import sweep as shown
+    from verification.sweeps import sections as shown
     from verification.sweeps.grid import read_sweep
     from verification.sweeps.store import plan
     from verification.sweeps.sweep import sweep_grid, work_of
@@ -270,8 +270,8 @@ def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Pa
     """
     from verification import figures
     from verification.output.files import staged
-    from verification.show.sweep import plane as sections
     from verification.sweeps.region import chart
+    from verification.sweeps.sections import plane as sections
 
     problem = load_problem(file, keys, swap=swap)
     check_place(target)

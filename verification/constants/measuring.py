@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from fem1d2d import Eigenvalue, elimination_order, largest, largest_sparse, solver
 from fem1d2d.mesh import Floats
 from ndtheory import Number
-from verification.certificate.proved_constants import verify
 from verification.constants.measured import (
     ALL_NAMES,
     FROM_MATRICES,
@@ -30,6 +29,7 @@ from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
 from verification.problem import Problem
+from verification.registry import PROOFS
 
 
 def measure(
@@ -89,7 +89,10 @@ def measure(
 
 def _measure(pair: ContactPair | TwoBodies, progress: Progress, verified: bool) -> Measured:
     plain = _without_matrices(pair, progress) if isinstance(pair, TwoBodies) else _with_matrices(pair)
-    return verify(plain, pair, progress=progress) if verified else plain
+    if not verified:
+        return plain
+    proved: Measured = PROOFS["constants"].of(plain, pair, progress=progress)
+    return proved
 
 
 def _with_matrices(pair: ContactPair) -> Measured:

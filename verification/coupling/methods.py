@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.algorithm.relaxation import RULES
 from verification.coupling.kinds import METHODS, BodyNumber
 from verification.coupling.spectrum import Spectrum
+from verification.registry import RULES
 
 #: Steps are those until ``|T x - x| < 1e-6 |T x|``, as coupling libraries stop, from x = 0.
 TOLERANCE = 1e-6

@@ -14,6 +14,7 @@ from scipy.linalg import eigh
 
 from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
 from ndtheory.energy_norms import predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
+from verification.algorithm.rates import steps
 from verification.algorithm.theta import Choice, automatic, by_prediction, energy_bounds
 from verification.constants import measure
 from verification.constants.measuring import normal_pencil, pencil
@@ -310,13 +311,6 @@ def spectrum_of(pair: ContactPair, *, normal: bool) -> Spectrum | None:
         return None
     with one_thread():
         return Spectrum.of(np.maximum(eigh(*(normal_pencil(pair) if normal else pencil(pair)), eigvals_only=True), 0.0))
-
-
-def steps(rate: float, tolerance: float = 1e-9) -> int | None:
-    """Number of steps of a rate to a tolerance; None where no number is enough."""
-    if not 0 < rate < 1:
-        return 1 if rate == 0 else None
-    return math.ceil(math.log(tolerance) / math.log(rate))
 
 
 def best_of(roles: Iterable[Role], *, tied: bool = False) -> Role:

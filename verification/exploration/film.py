@@ -15,13 +15,13 @@ from fem1d2d.mesh import Floats
 from verification.algorithm.history import History
 from verification.algorithm.runs import Run, run
 from verification.bounds.bound import Bound, NotComputed, Region, Subject
-from verification.bounds.table import BOUNDS
 from verification.constants import Measured
 from verification.contact import ContactError
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress
 from verification.problem.tables import ProblemError
+from verification.registry import BOUNDS
 from verification.sweeps.region import check_plane
 
 #: The bodies are drawn until the relative residual is below this: later steps look the same at the size of a page.

@@ -18,6 +18,7 @@ from verification.figures import style
 from verification.figures.style import BODIES, FILLS, PRESSURE, SHEAR, legend_beside, mark_states, plain
 from verification.interface.assembly import TwoBodies
 from verification.interface.fields import ContactFields
+from verification.registry import draw as main_figure
 
 #: Stresses that colour the cells: what the colour bar calls them, and their values from the tensors.
 STRESSES = {"mises": ("von Mises stress", von_mises), "sigma_yy": (r"$\sigma_{yy}$", lambda tensors: tensors[:, 1, 1])}
@@ -226,3 +227,6 @@ def _draw_along(ax: Axes, contact: ContactFields, curves: Sequence[tuple[str, Fl
         ax.plot(contact.x, values, look, color=colour, label=name)
     mark_states(ax, contact.status, contact.x, curves[1][1])
     ax.set_ylabel(label)
+
+
+main_figure.register(Solution, draw_bodies)

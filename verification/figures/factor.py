@@ -10,7 +10,9 @@ from matplotlib.figure import Figure
 
 from ndtheory import EnergyConstants, evaluate_energy
 from ndtheory.energy_norms import predicted_factor
+from verification.constants import Measured
 from verification.figures.style import BODIES, THETA, legend_beside, new_figure, styled
+from verification.registry import draw
 
 #: Thetas of a curve.
 POINTS = 80
@@ -42,3 +44,12 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
         ax.set_title("How much one step changes the distance of two forces")
         legend_beside(ax)
     return figure
+
+
+@draw.register
+def _(result: Measured) -> Figure:
+    """The factor of one step over theta: predicted, and proved in energy norms."""
+    energy = result.energy_constants()
+    if energy is None:
+        raise ValueError("the theorem in energy norms does not apply: " + result.why_no_energy)
+    return draw_factor({"": energy})

@@ -22,6 +22,7 @@ from verification.figures.style import (
     plain,
     styled,
 )
+from verification.registry import draw as main_figure
 
 #: Colours of the states in a map; the orange of slip and the grey of open nodes look alike in grey print.
 MAP = {"stick": STATES["stick"], "slip": STATES["slip"], "open": "#F4F4F4"}
@@ -118,3 +119,6 @@ def _shear(history: History, times: Sequence[float] | None = None) -> Figure:
         legend_beside(ax)
     axes[-1].set_xlabel(f"position along $\\Gamma_c$ [{plain(history.problem.units['length'])}]")
     return figure
+
+
+main_figure.register(History, draw_history)

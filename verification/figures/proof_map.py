@@ -6,10 +6,9 @@ import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from xml.sax.saxutils import escape
 
-from ndtheory.statements import Statement, proof_of, statements
+from ndtheory.statements import Statement, proof_of, recorded, statements
+from verification.bounds.losses import Loss, Losses
 from verification.figures.layers import Point, layered
-from verification.ledger.record import recorded
-from verification.semidefinite.losses import Loss, Losses
 
 #: Steps that lose something: the edge, the chain of :class:`Losses`, and the inequalities whose decades it adds up.
 STEPS: dict[tuple[str, str], tuple[str, tuple[str, ...]]] = {

@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from verification.bounds.table import BOUNDS
 from verification.figures.style import OUTCOMES, THETA, ink, legend_beside, new_figure, plain, styled
+from verification.registry import BOUNDS
+from verification.registry import draw as main_figure
 from verification.sweeps.region import Plane
 
 #: The enlarged part ends this much above the largest friction of which something is proved.
@@ -67,3 +68,6 @@ def _draw(ax: Axes, plane: Plane, left: float, bottom: float) -> None:
                 face, edge, words = "white", colour, "still falling when stopped"
             look = {"markerfacecolor": face, "markeredgecolor": edge, "markeredgewidth": 0.7, "markersize": 5}
             ax.plot(x, y, marker, **look, label=f"run {words}")
+
+
+main_figure.register(Plane, draw_region)

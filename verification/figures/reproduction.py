@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from verification.figures.style import THETA, legend_beside, mark_states, new_figure, styled
+from verification.registry import draw as main_figure
 from verification.reproduce.claims import PRINTED_THETA, ZONES
 from verification.reproduce.experiments import Reproduction, Result
 
@@ -52,3 +53,6 @@ def _curves(result: Result, ax: Any) -> None:
     ax.set_xlabel(THETA)
     ax.set_ylabel("steps, increment test")
     legend_beside(ax)
+
+
+main_figure.register(Reproduction, draw_reproduction)

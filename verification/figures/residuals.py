@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,7 +13,10 @@ from verification.algorithm.rates import noise
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
 from verification.bounds.table import named
+from verification.comparison import Comparison
+from verification.figures.bodies import draw_bodies
 from verification.figures.style import PRESSURE, legend_beside, mark_unfinished, new_figure, plain, styled
+from verification.registry import draw
 
 
 def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
@@ -46,3 +50,18 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
         if not run.converged:
             mark_unfinished(ax, run.outcome)
     return figure
+
+
+@draw.register
+def _(result: Run, view: str = "residuals", **options: Any) -> Figure:
+    """The residuals, or the bodies with the options of their figure."""
+    views: dict[str, Callable[..., Figure]] = {"residuals": draw_residuals, "bodies": draw_bodies}
+    if view not in views:
+        raise ValueError(f"{view!r}: needed one of {', '.join(views)}")
+    return views[view](result, **options)
+
+
+@draw.register
+def _(result: Comparison) -> Figure:
+    """The residuals beside what each bound proves of them."""
+    return draw_residuals(result.run, result.computed)

@@ -14,7 +14,9 @@ from ndtheory import EDITIONS, Constants
 from ndtheory import bounds as b
 from ndtheory.bounds import Edition
 from ndtheory.number import decimal, working_precision
+from verification.bounds.table import Calculated
 from verification.figures.style import BODY1, BODY2, THETA, new_figure, styled
+from verification.registry import draw
 
 #: Thetas of a curve.
 POINTS = 160
@@ -88,3 +90,12 @@ def _near_one(above: float, span: float) -> str:
     if span > 1e-3 or above == 0:
         return f"{round(1 + above, 9) + 0.0:g}"
     return f"1 {'-' if above < 0 else '+'} {abs(above):.2g}"
+
+
+@draw.register
+def _(result: Calculated) -> Figure:
+    """h_1 and h_2 over theta, of the editions that were asked for."""
+    if result.constants is None:
+        raise ValueError("h_1 and h_2 need the constants m, M, C_R and C_K")
+    chosen = [edition for edition in EDITIONS if not result.results[edition.name].not_computed]
+    return draw_squares(result.constants, chosen)

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from verification.figures.style import THETA, legend_beside, new_figure, plain, styled
+from verification.registry import draw as main_figure
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import Sweep
 
@@ -119,3 +120,6 @@ def draw_rules(panels: Mapping[str, Sequence[Row]], *, columns: int = 2) -> Figu
             ax.set_ylabel("steps")
         figure.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(names))
     return figure
+
+
+main_figure.register(Sweep, draw_sweep)

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ndtheory.statements import statements
+from verification.bounds.losses import Loss, Losses
 from verification.bounds.table import Printed, Repaired
 from verification.figures.style import STATES, new_figure, styled
-from verification.semidefinite.losses import Loss, Losses
 
 
 def draw_waterfall(losses: Losses, unit: str) -> Figure:

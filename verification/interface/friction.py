@@ -13,6 +13,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.interface.interface import Interface, Law
+from verification.registry import LAWS
 from verification.value import Value
 
 #: Part of the friction that the kernel may lose or add without a warning.  The share under an even pressure agrees
@@ -174,5 +175,4 @@ class GivenOperator(Value, Law):
         return self.matrix
 
 
-#: The laws of problem files, by name.
-LAWS: dict[str, type[Law]] = {law.name: law for law in (Nonlocal, Local, LocalOfContact)}
+LAWS.provide(Nonlocal, Local, LocalOfContact)

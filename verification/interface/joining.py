@@ -10,10 +10,10 @@ import numpy as np
 from fem1d2d import Line, Mesh, MeshError, Supports, facing, mortar, surface, trapezoid
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
-from verification.interface.friction import LAWS
 from verification.interface.interface import Grid, Interface, Law, Support, held_along
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
+from verification.registry import LAWS
 
 #: Largest number of nodes of a transfer, whose matrix is dense: more would fill the memory.
 MOST_NODES_APART = 2000

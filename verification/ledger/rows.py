@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
-from ndtheory.statements import Statement, statements
+from ndtheory.statements import Statement, recorded, statements
 from verification.document import Document
 from verification.ledger.evidence import METHODS, Evidence, Level, Method, Verdict, settle
-from verification.ledger.record import recorded
 
 #: A statement cannot be proved from one of these.
 NO_GROUND = ("REFUTED", "INCONCLUSIVE")

@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ndtheory import __version__
 from ndtheory.texts import printable
 from verification.comparison import Comparison
-from verification.ledger.record import on_the_printed_proof
+from verification.sections.bounds import on_the_printed_proof
 from verification.show.parts import Table, shown
 
 GLOSSARY = {

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from ndtheory import HypothesisError
 from verification.problem.colours import OddRing, Touching, neumann_bodies
@@ -50,39 +49,12 @@ from verification.problem.tables import (
     several,
     text,
 )
-
-
-class LawEntry(Protocol):
-    """The attributes of a law that a reader needs; see :class:`verification.interface.interface.Law`."""
-
-    label: str
-    needs_radius: bool
-
-
-class RuleEntry(Protocol):
-    """The attributes of a rule that a reader needs; see :class:`verification.algorithm.relaxation.Rule`."""
-
-    takes_theta: bool
-
-
-def registered_laws() -> Mapping[str, LawEntry]:
-    """Return the laws of friction that a file may name now.
-
-    Laws and rules act on what is made from problems, so this module imports theirs by name.
-    """
-    laws: Mapping[str, LawEntry] = importlib.import_module("verification.interface.friction").LAWS
-    return laws
-
-
-def registered_rules() -> Mapping[str, RuleEntry]:
-    """Return the relaxation rules that a file may name now."""
-    rules: Mapping[str, RuleEntry] = importlib.import_module("verification.algorithm.relaxation").RULES
-    return rules
+from verification.registry import LAWS, RULES
 
 
 def takes_theta(relaxation: Any) -> bool:
     """Return True if the rule of that name uses a given theta; names of no rule are refused elsewhere."""
-    rule = registered_rules().get(relaxation) if isinstance(relaxation, str) else None
+    rule = RULES.get(relaxation) if isinstance(relaxation, str) else None
     return rule is None or rule.takes_theta
 
 
@@ -175,7 +147,7 @@ def _read_several(top: TomlTable, dimension: Literal[1, 2], plane: Literal["stra
         raise top.refuse("contact", [], "needed a table, or several, each as [[contact]]")
     lines = [_read_line(table, bodies) for table in tables]
     laws = [contact.law for _, contact in lines if contact.friction] or [lines[0][1].law]
-    law = min(laws, key=lambda name: registered_laws()[name].needs_radius)  # the theorem is about one with a radius
+    law = min(laws, key=lambda name: LAWS[name].needs_radius)  # the theorem is about one with a radius
     touching = [pair for pair, _ in lines]
     if untouched := bodies.keys() - {i for pair in touching for i in pair}:
         raise top.refuse(f"body{min(untouched)}", None, "needed a table [[contact]] with another body")
@@ -458,9 +430,8 @@ def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stres
 
 
 def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
-    laws = registered_laws()
     friction, profile = table.take("friction", lambda value: _friction(value, table), (Fraction(0), None))
-    law = table.take("law", choice(*laws), "nonlocal")
+    law = table.take("law", choice(*LAWS), "nonlocal")
     radius = table.take("radius", positive, None)
     interval: Any = table.take("interval", ends, None)
     gap = table.take("gap", non_negative, Fraction(0))
@@ -475,11 +446,11 @@ def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
             raise table.refuse("friction", friction, "needed 0: two bars have no friction")
         if interval:
             raise table.refuse("interval", list(interval), "two bars meet at a point; leave it out in one dimension")
-    elif friction and laws[law].needs_radius and radius is None:
+    elif friction and LAWS[law].needs_radius and radius is None:
         raise table.refuse(
             "radius",
             None,
-            f'this key is missing; the {laws[law].label} law needs the radius of its kernel (or law = "local")',
+            f'this key is missing; the {LAWS[law].label} law needs the radius of its kernel (or law = "local")',
         )
     return ContactSpec(
         interval=interval, surface=surface, friction=friction, law=law, radius=radius, gap=gap, profile=profile
@@ -588,7 +559,7 @@ at_least_one = integer("a whole number >= 1", 1)
 
 
 def _read_iteration(table: TomlTable, neumann_body: Literal[1, 2]) -> IterationSpec:
-    relaxation: str = table.take("relaxation", choice(*registered_rules()), "constant")
+    relaxation: str = table.take("relaxation", choice(*RULES), "constant")
     spec = IterationSpec(
         neumann_body=neumann_body,
         theta=table.take("theta", factor, Fraction(1, 2) if takes_theta(relaxation) else "auto"),

@@ -322,7 +322,7 @@ class ContactSpec:
     friction : Fraction
         k, the largest one where it varies along Gamma_c.
     law : str
-        One of :data:`verification.interface.friction.LAWS`.
+        One of :data:`verification.registry.LAWS`.
     radius : Fraction or None
         Radius r of the hat kernel (length); None with a law that has none or without friction.
     gap : Fraction
@@ -395,7 +395,7 @@ class Settings:
         ``auto``: the proved theta; the predicted one where nothing is proved or the proved one is more than twice as
         slow.  Momentum takes its step from rho: ``auto`` unless the file has a theta, which is then not used.
     relaxation : str
-        One of :data:`verification.algorithm.relaxation.RULES`; the theorem covers only ``constant``.
+        One of :data:`verification.registry.RULES`; the theorem covers only ``constant``.
     tolerance : float
         The run ends when ``|||T g - g||| <= tolerance |||T g|||`` in the norm (5.21), with the largest T g so far.
     """

@@ -1,1 +1,4 @@
 """The semidefinite bound: its program, the multipliers that prove it, and the loss of each inequality."""
+
+#: The bound and the losses are worked out up to this many contact nodes: some seconds.
+LARGEST = 100

@@ -12,11 +12,11 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 
 from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import turning_theta, worst_ratio
-from verification.bounds import LARGEST
 from verification.constants import Measured
 from verification.dense import STILL
 from verification.interface.pair import ContactPair
 from verification.machine.threads import one_thread
+from verification.semidefinite import LARGEST
 from verification.semidefinite.interior_point import Optimum, Program, Weights
 from verification.semidefinite.trace_forms import TraceForms, families
 
@@ -87,7 +87,7 @@ class Conditions:
     Raises
     ------
     ValueError
-        A contact node is held, or there are more nodes than :data:`verification.bounds.LARGEST`.
+        A contact node is held, or there are more nodes than :data:`verification.semidefinite.LARGEST`.
     """
 
     @one_thread()

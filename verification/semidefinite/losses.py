@@ -20,54 +20,18 @@ from fem1d2d.mesh import Floats
 from ndtheory import PRINTED, REPAIRED
 from ndtheory import bounds as formulas
 from verification.algorithm.affine_piece import Piece
+from verification.bounds.losses import Loss, Losses
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
+from verification.registry import PROOFS, Prover
+from verification.semidefinite import LARGEST
 from verification.semidefinite.neighbours import Factors, squared
 from verification.semidefinite.pattern_search import Form, worst_piece
 
 #: Number of searches of patterns for the losses of one problem, and of starts of each.
 SEARCHES, STARTS = 6, 2
-
-
-@dataclass(frozen=True, kw_only=True)
-class Loss:
-    """Loss of one inequality.
-
-    Attributes
-    ----------
-    label : str
-        The paper's.
-    decades : float
-        ``log10(right/left)`` at the worst pair, >= 0; of an inequality between squares it counts the squares.
-    searched : bool
-        True if that pair was found by search (the loss may then be smaller), not as an eigenvector.
-    only_unit : bool
-        True if nothing is lost: the effect of a change of the unit of stress.
-    """
-
-    label: str
-    decades: float
-    searched: bool
-    only_unit: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class Losses:
-    """The losses of each inequality, ``links``, and of two chains, whose steps add up.
-
-    ``friction`` leads from the largest friction term found to its bound (5.30), repaired and then printed,
-    ``lipschitz`` from the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to its bound (5.38).
-    """
-
-    links: tuple[Loss, ...]
-    friction: tuple[Loss, ...]
-    lipschitz: tuple[Loss, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``losses`` of ``ndtheory.compare/1``."""
-        return {name: [vars(loss) for loss in losses] for name, losses in vars(self).items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,3 +233,14 @@ def _chain(*bounds: tuple[str, float]) -> tuple[Loss, ...]:
         Loss(label=label, decades=math.log10(value / before), searched=label not in ("(5.19)", "(5.23)"))
         for (_, before), (label, value) in pairwise(bounds)
     )
+
+
+def for_comparison(pair: ContactPair, measured: Measured, *, progress: Progress) -> tuple[Losses | None, str]:
+    """The losses, or None and why they were not worked out."""
+    if pair.contact.grid.n > LARGEST:
+        return None, f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
+    found = locate(pair, measured, progress=progress)
+    return found, "" if found is not None else measured.why_no_constants or "a contact node is held"
+
+
+PROOFS.provide(Prover("losses", for_comparison))

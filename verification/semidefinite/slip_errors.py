@@ -17,10 +17,10 @@ from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.monolithic import contact_system
-from verification.bounds import LARGEST
 from verification.contact.system import ContactSystem
 from verification.interface.assembly import TwoBodies, discretise
 from verification.problem import Problem
+from verification.semidefinite import LARGEST
 from verification.semidefinite.interior_point import Program, solve
 
 #: The program starts with kappa^2 nearer to 1 by this share, and with multipliers and s larger by it: strictly inside.
@@ -64,7 +64,7 @@ class SlipErrors:
     ------
     ValueError
         Bodies in 1D, a contact node that is held, a body that contact alone holds, more nodes than
-        :data:`verification.bounds.LARGEST`, or no friction: then the slip at the start does not enter.
+        :data:`verification.semidefinite.LARGEST`, or no friction: then the slip at the start does not enter.
 
     Examples
     --------

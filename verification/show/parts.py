@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
-from functools import singledispatch
 from typing import Any, Literal
 
 from ndtheory.number import Level
@@ -143,15 +142,6 @@ class Section(Shown):
 Sections = tuple[Section, ...]
 
 
-@singledispatch
-def of(result: Any) -> Sections:
-    """The sections of a result; a result without sections is shown as its document.
-
-    ``of.register`` adds a function for a class of results; :mod:`verification.show.of_results` imports all of ours.
-    """
-    return ()
-
-
 def section(
     id: str, title: str, *parts: Shown | str, caption: str = "", pictures: tuple[tuple[str, str], ...] = ()
 ) -> Section:
@@ -165,6 +155,11 @@ def closing(claims: str, *notes: Note, then: Next | str = "") -> Section:
     last = [Note(f"Not claimed: {claims}.", 0)] if claims else []
     command = [Next((then,)) if isinstance(then, str) else then] if then else []
     return section("limits", "", *notes, *last, *command)
+
+
+def outside_the_theorem(reason: str) -> Note:
+    """A reason why a problem lies outside the theorem."""
+    return Note(f"{reason}.", 0, "Outside the theorem:")
 
 
 def shown(sections: Iterable[Section], place: Place) -> Sections:

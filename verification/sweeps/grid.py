@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ndtheory.texts import did_you_mean
-from verification.algorithm.relaxation import RULES, Rule
-from verification.interface.friction import LAWS
+from verification.algorithm.relaxation import Rule
 from verification.problem.examples import example, examples
 from verification.problem.files import load, read_file
 from verification.problem.reading import coefficient, factor
@@ -30,6 +29,7 @@ from verification.problem.tables import (
     show,
     text,
 )
+from verification.registry import LAWS, RULES
 
 #: Largest number of rows of a sweep, so that a typing error does not fill the memory.
 MOST_ROWS = 200_000

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from verification.algorithm.relaxation import RULES, rule_of
-from verification.interface.friction import LAWS, GivenOperator
+from verification.algorithm.relaxation import rule_of
+from verification.interface.friction import GivenOperator
 from verification.interface.interface import Law
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
+from verification.registry import LAWS, RULES
 from verification.sweeps.grid import SweepGrid
 
 #: The solver of step II in a row: the active set, and the model where that does not settle.

@@ -11,17 +11,16 @@ import numpy as np
 
 from verification.algorithm.ending import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
-from verification.bounds.table import BOUNDS
 from verification.constants import Measured, measure
 from verification.constants.measured import SLIDES
 from verification.contact import ContactError
 from verification.document import Document
-from verification.interface.friction import LAWS
 from verification.interface.pair import ContactPair, pair_from
 from verification.machine.interrupts import INTERRUPTED
 from verification.machine.progress import Progress, silent
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
+from verification.registry import BOUNDS, LAWS
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import sweep_grid

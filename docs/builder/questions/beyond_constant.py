@@ -11,7 +11,7 @@ import numpy as np
 
 import verification as vf
 from builder.scenes import axis, chart, dots, line, note, scene, slider, widget
-from verification.algorithm.relaxation import RULES
+from verification.registry import RULES
 
 LABEL = "Residual and change of the force over the steps of a rule, and the force where the paper's test stops it"
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from ledger_calls import EXACT, RAW, STATEMENTS, TEXTS, VERDICTS, one_line, wide
 
-from verification.show.ledger import plain
+from verification.ledger.sections import plain
 
 # --- screens ---
 

@@ -98,7 +98,7 @@ def test_the_calculator_says_of_the_printed_proof_what_is_recorded(call, monkeyp
     small_m = ["bounds", "--m", "1/2", "--M", "2", "--CR", "1", "--CK", "1/100"]
     assert f"whose verdict in the ledger is {rows.recorded()['5.30']}" in one_line(call(*small_m).out)
     other = rows.recorded() | {"5.30": "NUMERICAL"}
-    monkeypatch.setattr("verification.ledger.record.recorded", lambda: other)
+    monkeypatch.setattr("ndtheory.statements.recorded", lambda: other)
     answer = call(*small_m)
     assert "whose verdict in the ledger is NUMERICAL" in one_line(answer.out)
     assert wide(answer) == []

@@ -6,16 +6,17 @@ import re
 from collections.abc import Iterator
 
 from ndtheory.statements import symbols
+from verification import registry
 from verification.ledger.rows import Ledger, Row
 from verification.ledger.sheets import FAULTS, WORDS, outcome
 from verification.show.numbers import count
-from verification.show.parts import Facts, Note, Section, Sections, closing, of, section, table
+from verification.show.parts import Facts, Note, Section, Sections, closing, section, table
 
 #: Where the verdicts are defined.
 DEFINED = Note("What each verdict means: docs/glossary.md, under verdict.", 0)
 
 
-@of.register
+@registry.sections.register
 def sections(found: Ledger) -> Sections:
     """The sections: a summary if every statement is there, else one for each row."""
     return _summary(found) if found.whole else _rows(found)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from verification import registry
 from verification.reproduce.claims import CLAIMS, zones
 from verification.reproduce.experiments import Outcome, Reproduction, Result
-from verification.show.parts import Facts, Section, Sections, closing, of, section, table
+from verification.show.parts import Facts, Section, Sections, closing, section, table
 
 
-@of.register
+@registry.sections.register
 def sections(found: Reproduction) -> Sections:
     """The sections."""
     about = "Section 6 of the paper, run again on its meshes; non-local law, r = 0.1 mm"

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from verification import registry
+from verification.algorithm.rates import steps
 from verification.constants.measured import NO_LAW
 from verification.coupling.accelerated import Accelerated
 from verification.coupling.cells import NARROW, Suggested
@@ -13,7 +15,7 @@ from verification.coupling.kinds import BodyNumber
 from verification.coupling.methods import NAMES as METHOD_NAMES
 from verification.coupling.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
 from verification.coupling.readings import assumed as assumption
-from verification.coupling.roles import Advice, Role, in_steps, steps
+from verification.coupling.roles import Advice, Role, in_steps
 from verification.coupling.runs_with_friction import FrictionBounds
 from verification.coupling.seen import LogBound, RhoInterval, SeenLog
 from verification.coupling.seen_moduli import Corners, ModuliRole, SeenModuli, SeenWaves, excluded_from
@@ -34,11 +36,10 @@ from verification.show.parts import (
     Table,
     closing,
     following,
-    of,
+    outside_the_theorem,
     section,
     table,
 )
-from verification.show.setting import outside_the_theorem
 
 
 def _name(found: Advice, body: int | None) -> str:
@@ -56,7 +57,7 @@ EXCHANGED = (
 )
 
 
-@of.register
+@registry.sections.register
 def sections(found: Advice) -> Sections:
     """The sections."""
     if found.waves is not None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from verification.interface.friction import LAWS
 from verification.problem.specification import Problem
 from verification.problem.specs import PLACES, ContactSpec
+from verification.registry import LAWS
 from verification.show.numbers import figures
-from verification.show.parts import Facts, Next, Note, Section, closing, section
+from verification.show.parts import Facts, Next, Section, closing, outside_the_theorem, section
 
 
 def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
@@ -53,11 +53,6 @@ def _how(problem: Problem) -> str:
     if relaxation != "constant":
         return relaxation
     return f"theta = {theta if theta == 'auto' else f'{float(theta):.4g}'}"
-
-
-def outside_the_theorem(reason: str) -> Note:
-    """A reason why a problem lies outside the theorem."""
-    return Note(f"{reason}.", 0, "Outside the theorem:")
 
 
 def limits(outside: Iterable[str], then: Next) -> Section:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from ndtheory import EnergyBounds
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
+from verification.sections.run import ended
 from verification.show.numbers import factor, figures, interval, near_one
 from verification.show.parts import Labelled, Section, section
-from verification.show.run import ended
 
 #: What the lines of the answer mean.
 CAPTION = (

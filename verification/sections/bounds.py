@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from ndtheory import Bounds, EnergyBounds
+from ndtheory.statements import quote
+from verification import registry
 from verification.bounds.bound import BoundResult, bounded
 from verification.bounds.table import Calculated, named
-from verification.ledger.record import on_the_printed_proof
 from verification.show.numbers import LEGEND, NONE, at_least, factor, figures, interval, marked
 from verification.show.parts import (
     Cell,
@@ -19,7 +20,6 @@ from verification.show.parts import (
     Shown,
     Table,
     closing,
-    of,
     section,
     table,
 )
@@ -80,7 +80,7 @@ def contracts(rows: Sequence[BoundResult], unit: str, why: str = "") -> Section:
     return section("bounds", "DOES ONE STEP CONTRACT?", *parts, caption=CAPTION)
 
 
-@of.register
+@registry.sections.register
 def sections(found: Calculated) -> Sections:
     """The sections of the calculator."""
     facts = []
@@ -133,3 +133,13 @@ def thetas(details: Iterable[object]) -> Sections:
         caption = "The theta with the least proved factor per step, and the one that rho suggests."
         found.append(section("thetas", "WHICH THETA?", lines, caption=caption))
     return tuple(found)
+
+
+def on_the_printed_proof() -> str:
+    """Sentences of screens and reports on the printed proof where m < 1."""
+    rescued = "x-printed-rescued"
+    return (
+        f"The printed proof needs m >= 1: it rests on (5.30), whose verdict in the ledger is {quote('5.30')}."
+        f"  {quote(rescued, 'title')}, for M >= 2 m, by another estimate, whose verdict is {quote(rescued)}."
+        f"  See: ndtheory verify 5.30 {rescued}"
+    )

@@ -9,30 +9,19 @@ from shlex import quote
 from typing import Any
 
 from ndtheory.number import directed
+from verification import registry
 from verification.bounds.table import named
 from verification.certificate import check
 from verification.certificate.continuum import ContinuumCertificate
 from verification.certificate.contraction import Certificate, Checked
 from verification.problem.specs import PLACES
 from verification.show.numbers import figures, rounded
-from verification.show.parts import (
-    Cell,
-    Facts,
-    Note,
-    Quantity,
-    Section,
-    Sections,
-    closing,
-    following,
-    of,
-    section,
-    table,
-)
+from verification.show.parts import Cell, Facts, Note, Quantity, Section, Sections, closing, following, section, table
 
 CLAIMS = "anything about the continuum"
 
 
-@of.register
+@registry.sections.register
 def sections(found: Certificate, target: Path | None = None) -> Sections:
     """The sections; ``target`` is where the certificate is written."""
     discrete, claim = found.discrete, []
@@ -66,7 +55,7 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     )
 
 
-@of.register
+@registry.sections.register
 def checked(found: Checked) -> Sections:
     """The sections of a check."""
     said: list[Note | str] = ["ACCEPTED: the claim holds for these bodies" if found.accepted else "REFUSED"]
@@ -99,7 +88,7 @@ def _few(value: float, up: bool) -> str:
     return f"{float(directed(value, 4, up=up)):.4g}"
 
 
-@of.register
+@registry.sections.register
 def continuum(found: ContinuumCertificate) -> Sections:
     """The sections of a proof for the continuous problem."""
     problem, document = found.problem, found.content()

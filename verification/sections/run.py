@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from verification import registry
 from verification.algorithm.monolithic import Solution
+from verification.algorithm.rates import steps
 from verification.algorithm.runs import Run
-from verification.coupling.roles import steps
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Interface
 from verification.problem.specification import Problem
 from verification.problem.specs import PLACES
+from verification.sections.setting import limits, setting
 from verification.show.numbers import NONE, count, figures, near_one
 from verification.show.parts import (
     Cell,
@@ -20,11 +22,9 @@ from verification.show.parts import (
     Sections,
     Shown,
     following,
-    of,
     section,
     table,
 )
-from verification.show.setting import limits, setting
 
 #: What the table of a run shows, and its figures.
 RATES = (
@@ -41,7 +41,7 @@ PICTURES = (
 )
 
 
-@of.register
+@registry.sections.register
 def sections(finished: Run) -> Sections:
     """The sections; none of a run on matrices without a problem."""
     if finished.problem is None:
@@ -132,7 +132,7 @@ def _at_the_end(finished: Run) -> str:
     return " ".join(said)
 
 
-@of.register
+@registry.sections.register
 def solution(found: Solution) -> Sections:
     """The sections of the global method."""
     bodies = found.bodies

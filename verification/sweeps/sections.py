@@ -6,10 +6,11 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
+from verification import registry
 from verification.bounds.table import named
 from verification.problem.specification import Problem
 from verification.show.numbers import NONE, count, figures, near_one
-from verification.show.parts import Cell, Facts, Next, Quantity, Sections, closing, following, of, section, table
+from verification.show.parts import Cell, Facts, Next, Quantity, Sections, closing, following, section, table
 from verification.sweeps.region import MOST_STEPS, Plane
 from verification.sweeps.row import Row
 from verification.sweeps.store import Plan
@@ -22,7 +23,7 @@ MOST_LINES = 24
 HEADS = {"young1": "E1", "young2": "E2", "neumann_body": "Neumann", "friction": "k"}
 
 
-@of.register
+@registry.sections.register
 def sections(found: Sweep, target: Path | None = None) -> Sections:
     """The sections; ``target`` is where the rows are written."""
     curves = [name for name in found.axes if name != "theta"]
@@ -52,7 +53,7 @@ def sections(found: Sweep, target: Path | None = None) -> Sections:
     )
 
 
-@of.register
+@registry.sections.register
 def plan(found: Plan) -> Sections:
     """A sweep that was planned, not run."""
     title = Facts(_title(found.problem), (f"{found.asked} runs",))
@@ -83,7 +84,7 @@ def _short(value: Any) -> Cell:
     return NONE if value is None else str(value)
 
 
-@of.register
+@registry.sections.register
 def plane(found: Plane, target: Path | None = None) -> Sections:
     """The sections of the plane of theta and k; ``target`` is where the figure is drawn."""
     rows = []

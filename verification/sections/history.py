@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
+from verification import registry
 from verification.algorithm.history import History
+from verification.sections.run import then, unfinished
+from verification.sections.setting import limits, setting
 from verification.show.numbers import NONE, count, figures, near_one
-from verification.show.parts import Cell, Note, Quantity, Sections, Shown, following, of, section, table
-from verification.show.run import then, unfinished
-from verification.show.setting import limits, setting
+from verification.show.parts import Cell, Note, Quantity, Sections, Shown, following, section, table
 
 #: What the table of a history shows.
 STEPS = (
@@ -24,7 +25,7 @@ PICTURES = (
 )
 
 
-@of.register
+@registry.sections.register
 def sections(found: History) -> Sections:
     """The sections."""
     first = found.increments[0].result

@@ -5,14 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from shlex import quote
 
+from verification import registry
 from verification.exploration.film import Shown
 from verification.exploration.page import Exploration
 from verification.problem.specs import PLACES
 from verification.show.numbers import NONE, count, figures, near_one
-from verification.show.parts import Cell, Facts, Section, Sections, closing, of, section, table
+from verification.show.parts import Cell, Facts, Section, Sections, closing, section, table
 
 
-@of.register
+@registry.sections.register
 def sections(found: Exploration, target: Path | None = None) -> Sections:
     """The sections: for each role and friction the theta with the fewest steps; ``target`` is the page."""
     then = "" if target is None else f"open {quote(str(target))}"

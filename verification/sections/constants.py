@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from verification import registry
 from verification.constants import Measured
 from verification.constants.measured import ENERGY_NAMES, NAMES
 from verification.interface import assembly
+from verification.sections.setting import setting
 from verification.show.numbers import between, figures
-from verification.show.parts import Note, Section, Sections, Shown, closing, following, of, section, table
-from verification.show.setting import setting
+from verification.show.parts import Note, Section, Sections, Shown, closing, following, section, table
 
 #: The constants that a comparison shows.
 COMPARED = ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
@@ -34,7 +35,7 @@ WORDS = {
 }
 
 
-@of.register
+@registry.sections.register
 def sections(measured: Measured) -> Sections:
     """The sections; none if the constants come from matrices without a problem."""
     problem = measured.problem

@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from verification import registry
 from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
 from verification.algorithm.theta import Choice
 from verification.bounds.bound import BoundResult
+from verification.bounds.losses import Losses
 from verification.bounds.verdicts import RunVerdict
 from verification.comparison import Comparison, Listener
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
-from verification.semidefinite.losses import Losses
-from verification.show.answer import answer
-from verification.show.bounds import bounds, contracts, thetas
-from verification.show.constants import compared
-from verification.show.constants import sections as all_constants
+from verification.sections.answer import answer
+from verification.sections.bounds import bounds, contracts, thetas
+from verification.sections.constants import compared
+from verification.sections.constants import sections as all_constants
+from verification.sections.run import happened
+from verification.sections.setting import limits, setting
 from verification.show.numbers import near_one
-from verification.show.parts import Labelled, Note, Section, Sections, following, of, section, table
-from verification.show.run import happened
-from verification.show.setting import limits, outside_the_theorem, setting
+from verification.show.parts import Labelled, Note, Section, Sections, following, outside_the_theorem, section, table
 
 #: The captions of the table of verdicts and of the figure of the losses.
 RATIOS = (
@@ -136,7 +137,7 @@ def verdicts(result: Comparison) -> Sections:
     return section("verdicts", title, judged, caption=RATIOS), limits(result.run.outside, following("advise"))
 
 
-@of.register
+@registry.sections.register
 def sections(result: Comparison) -> Sections:
     """The sections; a report has more at its beginning and end: warnings, the theta, all constants."""
     if result.problem is None:

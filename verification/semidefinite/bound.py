@@ -1,0 +1,113 @@
+"""The semidefinite bound beside the others: programs are loaded once it is worked out."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from ndtheory import Number
+from ndtheory.constants import relaxation_factor
+from ndtheory.number import Numeric, below
+from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, trace
+from verification.machine.progress import Progress, silent
+from verification.registry import BOUNDS
+from verification.semidefinite import LARGEST
+
+if TYPE_CHECKING:
+    from verification.interface.pair import ContactPair
+    from verification.semidefinite.lipschitz import Enclosure
+    from verification.semidefinite.multipliers import QuadraticForms
+
+#: Friction values that trace the border of the region, at most.
+TRACED = 25
+
+
+class SemidefiniteBound(Bound):
+    """The factor proved by multipliers of the conditions of step II, up to LARGEST nodes; see ``docs/energy.md``."""
+
+    name, words = "lmi", "the semidefinite bound"
+    colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
+    calculated = False
+    attained = True  # without friction
+    apart = certifies = divides = True
+
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
+        if theta is None or subject.pair is None or subject.measured is None:
+            return self.absent("needed a pair of bodies and a theta")
+        if subject.pair.contact.grid.n > LARGEST:
+            return self.absent(f"{subject.pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+        from verification.semidefinite.interior_point import LMIError
+        from verification.semidefinite.lipschitz import work_out
+
+        chosen = relaxation_factor(theta)
+        theta = float(chosen)
+        try:
+            found = work_out(subject.pair, subject.measured, theta, exact=subject.exact, progress=progress)
+        except (LMIError, ValueError) as error:
+            return self.absent(str(error))
+        if subject.measured.unverified is not None:  # proofs were asked for
+            found = found.proved(subject.pair, subject.measured, chosen, progress=progress)
+        factor, allowed, largest = found.factor, found.friction_threshold, found.theta_max
+        on = "k" if allowed is not None or subject.measured.C_t1 is None else "any"
+        return BoundResult(
+            name=self.name,
+            proved=True,
+            theta=theta,
+            factor=factor,
+            one_minus_factor=None if factor is None else _rest(factor),
+            interval=None if largest is None else (0.0, largest.value if largest.lo is None else largest.lo),
+            interval_level="float" if largest is None else largest.level,
+            friction=Thresholds(every=allowed, on=on),
+            why=found.why_no_factor,
+            not_computed=found.gave_up if factor is None else "",
+            detail=found,
+        )
+
+    def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
+        found = None if result is None else result.detail
+        if found is None:
+            return ()
+        said = [f"{self.name}: some loads reach a factor of {found.lower:.3f}, {found.gap:.2%} less"]
+        if found.divided is not None:
+            divided = f"dividing the pieces of T gives {found.divided.value:#.4g} in doubles"
+            said.append(f"{self.name}: proved is the factor of one program; {divided}")
+        if found.unverified is not None and not found.certified:
+            said.append(f"{self.name} is not proved: {found.not_proved}")
+        return tuple(said)
+
+    def enclose(
+        self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
+    ) -> Enclosure:
+        from verification.semidefinite.lipschitz import CERTIFIED, CLOSE, budget, enclose
+
+        programs = min(CERTIFIED, 20 * budget(pair.contact.grid.n)) if exact else 1
+        gap = CLOSE if exact else float("inf")
+        return enclose(pair, forms, theta, gap=gap, programs=programs, progress=progress)
+
+    def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
+        from verification.semidefinite.interior_point import LMIError
+        from verification.semidefinite.lipschitz import thetas
+
+        pair, measured = subject.pair, subject.measured
+        if pair is None or measured is None or measured.friction_threshold is None:
+            raise NotComputed("needed a pair of bodies with a law of friction")
+        if pair.contact.grid.n > LARGEST:
+            raise NotComputed(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+        try:
+            last, largest = thetas(pair, measured, progress=progress)
+            interval = lambda k: None if (end := largest(k)) is None else (0.0, end)
+            k, theta = trace(interval, last, TRACED)
+        except (LMIError, ValueError) as error:
+            raise NotComputed(str(error)) from None
+        return Region(k=k, theta=theta, every=last, some=last)
+
+
+def _rest(factor: Number) -> Number:
+    """1 minus a factor."""
+    if factor.hi is None:
+        return Number.of_float(1 - factor.value)
+    least = below(1 - Fraction(factor.hi))
+    return Number(value=max(1 - factor.value, least), lo=least, level=factor.level)
+
+
+BOUNDS.provide(SemidefiniteBound())
