@@ -22,7 +22,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "theory": {
         "ndtheory.symbolic": "__init__ checks dimension engine further mechanics quotient section5 symbols",
         "ndtheory.continuum": "__init__ calibration intervals rectangles segments strip wedges",
-        "ndtheory": "__init__ bounds constants energy_norms errors moduli number scalar statements texts",
+        "ndtheory": "__init__ bounds constants energy_norms errors keys moduli number scalar statements texts",
     },
     "elastic bodies": {
         "fem1d2d.proofs": "__init__ enclosed exact layers_proved loewner proved",
@@ -32,14 +32,14 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
     },
     "for all of verification": {
-        "verification": "dense registry schemas spreadsheet value",
+        "verification": "dense registry spreadsheet value",
         "verification.machine": "__init__ interrupts progress threads",
         "verification.show": "__init__ layout numbers parts",
     },
     "input": {
         "verification.problem": "__init__ colours examples files reading specification specs steps tables writing"
     },
-    "results, extras": {"verification": "document extras"},
+    "results, extras": {"verification": "document extras schemas"},
     "bodies": {
         "verification.interface": (
             "__init__ assembly body build checks fields files friction interface joining matrices pair several"
@@ -107,7 +107,7 @@ FLOORS: dict[str, dict[str, str]] = {
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
     "fem1d2d": 4750,
-    "ndtheory": 6600,
+    "ndtheory": 6950,
     "verification": 1350,
     "verification.algorithm": 3550,
     "verification.bounds": 850,

@@ -133,6 +133,27 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
     "rules": {"": ("algorithm.relaxation",)},
     "bounds": {"": ("bounds.table", "semidefinite.bound")},
     "proofs": {"": ("certificate.proved_constants", "semidefinite.losses")},
+    "documents": {
+        "": (
+            "algorithm.history",
+            "algorithm.monolithic",
+            "algorithm.runs",
+            "bounds.table",
+            "certificate.continuum",
+            "certificate.contraction",
+            "cli.console",
+            "cli.problems",
+            "comparison",
+            "constants.measured",
+            "coupling.roles",
+            "exploration.page",
+            "ledger.rows",
+            "reproduce.experiments",
+            "sweeps.region",
+            "sweeps.store",
+            "sweeps.sweep",
+        )
+    },
     "sections": {
         "algorithm.history": ("sections.history",),
         "algorithm.monolithic": ("sections.run",),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import html
 import json
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ndtheory import __version__
+from ndtheory import __version__, keys
 from verification import registry
 from verification.show.layout import text
 from verification.show.parts import Section
@@ -21,12 +21,14 @@ if TYPE_CHECKING:
 
 
 class Document(Value, ABC):
-    """A frozen result that can be written as one JSON document; subclasses name their schema.
+    """A frozen result that can be written as one JSON document; subclasses name their schema, and their keys by
+    :func:`ndtheory.keys.key` and :func:`ndtheory.keys.says`.
 
     Showing a document computes nothing: a part that was not asked for is null, with its reason.
     """
 
     schema: ClassVar[str]
+    kind: ClassVar[str] = ""
 
     #: Labels ``length`` and ``stress``.
     units: Mapping[str, str]
@@ -34,9 +36,14 @@ class Document(Value, ABC):
     #: The problem of the result; None where there is none.
     problem: Problem | None = None
 
-    @abstractmethod
+    @classmethod
+    def key_table(cls) -> str:
+        """The name of the table of its keys: the schema, with the kind where several documents share one."""
+        return ", ".join(filter(None, (cls.schema, cls.kind)))
+
     def content(self) -> dict[str, Any]:
         """Return the values of the document besides schema, version, units and problem."""
+        return keys.document(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the document as plain dictionaries, lists and numbers."""

@@ -1,6 +1,6 @@
 """The keys of every document as tables, and as JSON Schemas (draft 2020-12).
 
-The tables are data, in ``schemas.toml`` beside this module.  The page on documents shows them.
+The tables are made from the keys of the classes of results (:mod:`ndtheory.keys`).  The page on documents shows them.
 """
 
 from __future__ import annotations
@@ -8,12 +8,15 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from ndtheory import keys
+from ndtheory.keys import INCLUDED, Row
 from ndtheory.texts import did_you_mean
+from verification import registry
+from verification.document import Document
 
 JsonSchema = dict[str, Any]
 
@@ -28,8 +31,11 @@ TYPES: dict[str, JsonSchema] = {
     "free": {"type": ["array", "boolean", "number", "object", "string"]},
 }
 
-#: What a row begins with that includes a part.
-INCLUDED = "all keys of "
+#: The rows with which the table of a document begins.
+HEADER = (
+    Row(keys=(f"{INCLUDED}Header",)),
+    Row(keys=("problem",), type="Problem", says="what the result is about", absent="where that is no problem file"),
+)
 
 #: How the type of an object begins that may be a list of a part instead.
 EITHER = "object, or list of "
@@ -38,44 +44,30 @@ EITHER = "object, or list of "
 _REFERENCE = re.compile(r"\{(\w+)\}`(?:([^`<]+) <[^`>]+>|([^`]+))`")
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Row:
-    """A row of a table: keys that share a type and a meaning.
-
-    Attributes
-    ----------
-    keys : tuple of str
-        Paths with dots, in which ``*`` stands for any name; or one that names an included part.
-    type, unit, says : str
-        Type, unit and meaning; empty where there is none.
-    null, absent : str or None
-        When the value is null, and when the key is left out; None for never.
-    """
-
-    keys: tuple[str, ...]
-    type: str = ""
-    unit: str = ""
-    says: str = ""
-    null: str | None = None
-    absent: str | None = None
-
-    @property
-    def meaning(self) -> str:
-        """The meaning in words, with when the value is null and when the key is left out."""
-        conditional = [
-            f"{word} {when}" for word, when in (("null", self.null), ("left out", self.absent)) if when is not None
-        ]
-        return "; ".join([self.says, *conditional] if self.says else conditional)
-
-
 @cache
 def tables() -> dict[str, tuple[Row, ...]]:
     """Return the rows of each table, by the schema of a document or the name of a part."""
     data = tomllib.loads(files("verification").joinpath("schemas.toml").read_text("utf-8"))
-    return {
-        name: tuple(Row(keys=tuple(keys.split(", ")), **row) for keys, row in rows.items())
-        for name, rows in data.items()
+    found = {
+        name: tuple(Row(keys=tuple(names.split(", ")), **row) for names, row in each.items())
+        for name, each in data.items()
     }
+    registry.load("documents", "")
+    classes = {table: each for each in subclasses(Document) if keys.keys(each) and (table := each.key_table())}
+    named = {name: each for cls in classes.values() for name, each in keys.parts(cls).items()}
+    written = [name for name in found if name.startswith("ndtheory.")]
+    made = {name: HEADER + keys.rows(cls) for name, cls in classes.items()}
+    parts = {name: keys.rows(cls) for name, cls in named.items()}
+    rest = {name: each for name, each in found.items() if name not in written}
+    return {name: found[name] for name in written} | made | rest | parts
+
+
+def subclasses(cls: type[Document]) -> Iterator[type[Document]]:
+    """Yield the classes that derive from one, of this program."""
+    for each in cls.__subclasses__():
+        if each.__module__.startswith("verification."):
+            yield each
+        yield from subclasses(each)
 
 
 def rows(table: str) -> Iterator[tuple[str, str, Row]]:

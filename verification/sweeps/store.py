@@ -15,9 +15,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ndtheory import __version__
+from ndtheory.keys import key, says
 from verification.document import Document
 from verification.interface.pair import UNITS, ContactPair
 from verification.machine.interrupts import undisturbed
@@ -354,36 +355,29 @@ def notes(path: Path, others: Mapping[str, int], damaged: int, errors: int) -> t
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Plan(Document):
-    """Numbers of rows that a sweep would make and use.
-
-    Attributes
-    ----------
-    asked : int
-        Number of rows of the grid.
-    stored : int
-        Number of them that the store has and that would not be made again.
-    damaged : int
-        Number of further rows that it has damaged.
-    errors : int
-        Number of the stored rows that ended in an error.
-    others : mapping from a version of this library to a number
-        Rows of this sweep that were made under other numerics: they are not used.
-    store : Path or None
-        The store of the rows.
-    """
+    """Numbers of rows that a sweep would make and use."""
 
     schema: ClassVar[str] = "ndtheory.sweep-plan/1"
 
-    asked: int
-    stored: int
-    damaged: int
-    store: Path | None
-    errors: int = 0
-    others: Mapping[str, int] = field(default_factory=dict)
+    asked: int = key("number of rows of the grid", unit="1")
+    stored: int = key("rows that the store has and that would not be made again; 0 with `--fresh`", unit="1")
+    damaged: int = key("rows that the store has damaged", unit="1")
+    errors: int = key(
+        "stored rows that ended in an error; 0 with `--retry`, as those are made again", default=0, unit="1"
+    )
+    others: Mapping[str, int] = key(
+        "rows of this grid that were made with other numerics, by the version of this library; they are not used",
+        default_factory=dict,
+        name="other_versions",
+        type="free",
+        unit="1",
+    )
+    store: Path | None = key("the file of the store", null="where rows are not kept")
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
     problem: Problem | None = None
 
     @property
+    @says("rows that would be made", unit="1")
     def left(self) -> int:
         """Number of rows that would be made."""
         return self.asked - self.stored
@@ -396,17 +390,6 @@ class Plan(Document):
     def notes(self) -> tuple[str, ...]:
         """Sentences about rows of the store that would not be used, or ended in an error."""
         return () if self.store is None else notes(self.store, self.others, self.damaged, self.errors)
-
-    def content(self) -> dict[str, Any]:
-        return {
-            "asked": self.asked,
-            "stored": self.stored,
-            "left": self.left,
-            "damaged": self.damaged,
-            "errors": self.errors,
-            "other_versions": dict(self.others),
-            "store": None if self.store is None else str(self.store),
-        }
 
 
 def plan(
