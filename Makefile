@@ -52,11 +52,11 @@ drawn: $(VENV)/.test
 	PYTHONPATH=tests $(BIN)/python -m safeguards.drawn $(MODULE)
 
 # Each dependency has a test here that calls it.
-SAMPLE := fem1d2d/test_mesh_files.py ndtheory/test_gradient_descent.py ndtheory/test_symbolic.py cli/test_commands.py \
-	cli/test_documents.py cli/test_progress.py cli/test_shell.py cli/test_sweep_command.py verification/test_certificate.py \
-	verification/test_contact.py verification/test_figures.py verification/test_interior_point.py \
-	verification/test_report.py verification/test_sweep_cluster.py verification/test_sweep_dataset.py \
-	verification/test_threads.py
+SAMPLE := fem1d2d/test_mesh_files.py theorem/test_gradient_descent.py theorem/test_symbolic.py cli/test_commands.py \
+	cli/test_documents.py cli/test_progress.py cli/test_shell.py cli/test_sweep_command.py verification/certificate/test_certificate.py \
+	verification/contact/test_contact.py verification/showing/test_figures.py verification/semidefinite/test_interior_point.py \
+	verification/showing/test_report.py verification/sweeps/test_sweep_cluster.py verification/sweeps/test_sweep_dataset.py \
+	verification/algorithm/test_threads.py
 
 # In an environment without the lock; WHOLE=1 runs all tests.
 lowest: RESOLUTION := lowest-direct
@@ -76,7 +76,7 @@ kratos: $(VENV)/.venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(UV)
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(KRATOS)
 	$(BIN)/uv pip install --quiet --python $(KRATOS)/bin/python --requirement requirements-test.lock --editable . $(WHEELS)
-	$(KRATOS)/bin/python -m pytest -n auto -p no:cacheprovider tests/verification/test_kratos.py
+	$(KRATOS)/bin/python -m pytest -n auto -p no:cacheprovider tests/verification/coupling/test_kratos.py
 
 paper: $(VENV)/.run
 	$(BIN)/python docs/paper/compute.py docs/_build/paper

@@ -21,11 +21,18 @@ NOTES = "CONTRIBUTING.md"
 
 #: part: what it runs, patterns of files of tests or a package with its examples; * passes folders.
 PARTS = {
-    "theory": ("tests/ndtheory/*", "ndtheory"),
+    "theory": ("tests/theorem/*", "tests/ndtheory/*", "ndtheory"),
     "elements": ("tests/fem1d2d/*", "fem1d2d"),
-    "verification-a-e": ("tests/verification/test_[a-e]*",),
-    "verification-f-l": ("tests/verification/test_[f-l]*",),
-    "verification-m-z": ("tests/verification/test_[m-z]*", "verification"),
+    "bodies": tuple(f"tests/verification/{name}/*" for name in ("problem", "interface", "contact", "constants")),
+    "runs": tuple(f"tests/verification/{name}/*" for name in ("algorithm", "sweeps")),
+    "proofs": tuple(f"tests/verification/{name}/*" for name in ("bounds", "semidefinite", "certificate")),
+    "couplings": ("tests/verification/coupling/*",),
+    "paper": (
+        "tests/verification/paper/*",
+        "tests/verification/showing/*",
+        "tests/verification/test_*",
+        "verification",
+    ),
     "cli": ("tests/cli/*",),
     "docs": ("tests/docs/*", "tests/test_*"),
     "mutants": ("tests/safeguards/*",),

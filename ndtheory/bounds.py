@@ -2,7 +2,7 @@
 
 Every formula applies to any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval, an
 object that records its operations), avoids the cancellation of the printed form, and branches by
-:func:`ndtheory.scalar.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With u = m all m,
+:func:`ndtheory.scalar.where`.  Docstrings give the equation, ``tests/theorem`` a second derivation.  With u = m all m,
 M, u and x = C_K are stresses and G is a stress cubed; C_R, theta, C_T, P, D, Q, C_0, C_1, C_6 are numbers.
 
 The two editions are one set of formulas.  The paper's bracket ``M C_R + C_K + sqrt(C_K m) + 1`` in (5.30)

@@ -2,59 +2,61 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
 
 def _tests(names: str) -> tuple[str, ...]:
-    return tuple(f"tests/{name.replace('/', '/test_')}.py" for name in names.split())
+    """The files of tests by what they are about, in whichever folder they lie."""
+    found = {name: sorted(ROOT.glob(f"tests/*/**/test_{name}.py")) for name in names.split()}
+    if unclear := [name for name, paths in found.items() if len(paths) != 1]:
+        raise ValueError(f"needed one file of tests for each of {', '.join(unclear)}")
+    return tuple(paths[0].relative_to(ROOT).as_posix() for paths in found.values())
 
 
 #: The files of tests that are about each module, the one most likely to notice a change first.
 MISSION: dict[str, tuple[str, ...]] = {
     f"{module}.py": _tests(tests)
     for module, tests in {
-        "fem1d2d/assembly": "fem1d2d/assembly fem1d2d/uncoupled fem1d2d/polygons fem1d2d/condense",
-        "fem1d2d/condense": "fem1d2d/flexibility fem1d2d/condense fem1d2d/uncoupled verification/few_unknowns",
-        "fem1d2d/element": "fem1d2d/element fem1d2d/strain fem1d2d/assembly fem1d2d/material",
-        "fem1d2d/line": "fem1d2d/line verification/lines",
-        "fem1d2d/mesh": "fem1d2d/mesh fem1d2d/overlap fem1d2d/supports fem1d2d/outline",
-        "fem1d2d/pencil": "fem1d2d/bars fem1d2d/refinement fem1d2d/pencil",
-        "fem1d2d/supports": "fem1d2d/supports fem1d2d/refinement",
-        "fem1d2d/trace": "fem1d2d/transfer fem1d2d/trace",
-        "ndtheory/bounds": "ndtheory/bounds_hypotheses ndtheory/bounds ndtheory/enclosures",
-        "ndtheory/constants": "ndtheory/bounds_hypotheses ndtheory/energy_hypotheses ndtheory/enclosures",
-        "ndtheory/energy_norms": "safeguards/energy_safe ndtheory/energy_norms ndtheory/energy_hypotheses",
-        "ndtheory/number": "ndtheory/number ndtheory/enclosures",
-        "verification/algorithm/affine_piece": "verification/jacobian verification/margin",
-        "verification/algorithm/ending": "verification/arrival verification/iteration",
-        "verification/algorithm/fixed_point": "verification/lean_step verification/iteration verification/relaxation",
-        "verification/algorithm/linearisation": "verification/jacobian verification/prediction verification/margin",
-        "verification/algorithm/rates": "safeguards/rates_safe verification/rates",
-        "verification/algorithm/relaxation": "verification/relaxation verification/conformance",
-        "verification/algorithm/runs": "verification/iteration verification/results verification/held_by_contact",
-        "verification/semidefinite/conditions": "safeguards/multipliers_safe verification/lifted verification/exact",
-        "verification/semidefinite/interior_point": "verification/interior_point verification/exact",
-        "verification/semidefinite/lipschitz": (
-            "verification/mirror verification/exact verification/verified_comparison"
-        ),
-        "verification/semidefinite/multipliers": (
-            "safeguards/multipliers_safe verification/multipliers verification/exact"
-        ),
-        "verification/semidefinite/trace_forms": (
-            "verification/rounding_of_forms verification/rounding_of_forms_in_friction"
-        ),
-        "verification/comparison": "verification/compare_bounds verification/verdicts cli/first_numbers",
-        "verification/constants/measuring": "verification/constants verification/energy_constants",
-        "verification/constants/operators": "verification/operators",
-        "verification/contact/active_set": "verification/rigid_motion verification/contact verification/lean_step",
-        "verification/contact/kkt": "safeguards/kkt verification/contact",
-        "verification/contact/step": "verification/rigid_motion verification/contact verification/held_by_contact",
-        "verification/contact/system": "verification/global verification/few_unknowns",
-        "verification/interface/body": "verification/response verification/few_unknowns verification/constants",
-        "verification/interface/friction": "verification/warnings verification/build verification/grids",
-        "verification/interface/interface": "verification/build verification/grids verification/conformance",
-        "verification/interface/joining": "safeguards/joining verification/drawn_geometry verification/lines",
-        "verification/interface/pair": "verification/build verification/relaxation verification/constants",
-        "verification/algorithm/monolithic": "verification/global verification/checks verification/drawn_geometry",
-        "verification/bounds/verdicts": "verification/verdicts verification/verified_comparison",
+        "fem1d2d/assembly": "assembly uncoupled polygons condense",
+        "fem1d2d/condense": "flexibility condense uncoupled few_unknowns",
+        "fem1d2d/element": "element strain assembly material",
+        "fem1d2d/line": "line lines",
+        "fem1d2d/mesh": "mesh overlap supports outline",
+        "fem1d2d/pencil": "bars refinement pencil",
+        "fem1d2d/supports": "supports refinement",
+        "fem1d2d/trace": "transfer trace",
+        "ndtheory/bounds": "bounds_hypotheses bounds enclosures",
+        "ndtheory/constants": "bounds_hypotheses energy_hypotheses enclosures",
+        "ndtheory/energy_norms": "energy_safe energy_norms energy_hypotheses",
+        "ndtheory/number": "number enclosures",
+        "verification/algorithm/affine_piece": "jacobian margin",
+        "verification/algorithm/ending": "arrival iteration",
+        "verification/algorithm/fixed_point": "lean_step iteration relaxation",
+        "verification/algorithm/linearisation": "jacobian prediction margin",
+        "verification/algorithm/rates": "rates_safe rates",
+        "verification/algorithm/relaxation": "relaxation conformance",
+        "verification/algorithm/runs": "iteration results held_by_contact",
+        "verification/semidefinite/conditions": "multipliers_safe lifted exact",
+        "verification/semidefinite/interior_point": "interior_point exact",
+        "verification/semidefinite/lipschitz": ("mirror exact verified_comparison"),
+        "verification/semidefinite/multipliers": ("multipliers_safe multipliers exact"),
+        "verification/semidefinite/trace_forms": ("rounding_of_forms rounding_of_forms_in_friction"),
+        "verification/comparison": "compare_bounds verdicts first_numbers",
+        "verification/constants/measuring": "constants energy_constants",
+        "verification/constants/operators": "operators",
+        "verification/contact/active_set": "rigid_motion contact lean_step",
+        "verification/contact/kkt": "kkt contact",
+        "verification/contact/step": "rigid_motion contact held_by_contact",
+        "verification/contact/system": "global few_unknowns",
+        "verification/interface/body": "response few_unknowns constants",
+        "verification/interface/friction": "warnings build grids",
+        "verification/interface/interface": "build grids conformance",
+        "verification/interface/joining": "joining drawn_geometry lines",
+        "verification/interface/pair": "build relaxation constants",
+        "verification/algorithm/monolithic": "global checks drawn_geometry",
+        "verification/bounds/verdicts": "verdicts verified_comparison",
     }.items()
 }
 

@@ -39,9 +39,9 @@ TESTS: dict[str, tuple[str, ...]] = {
     "fem1d2d/proofs/loewner.py": ("tests/safeguards/test_loewner.py",),
     "ndtheory/energy_norms.py": ("tests/safeguards/test_energy_safe.py",),
     "verification/coupling/from_logs.py": (
-        "tests/verification/test_from_logs.py",
-        "tests/verification/test_runs_with_friction.py",
-        "tests/verification/test_next_run.py",
+        "tests/verification/coupling/test_from_logs.py",
+        "tests/verification/coupling/test_runs_with_friction.py",
+        "tests/verification/coupling/test_next_run.py",
     ),
     "verification/algorithm/rates.py": ("tests/safeguards/test_rates_safe.py",),
     "verification/semidefinite/conditions.py": ("tests/safeguards/test_multipliers_safe.py",),

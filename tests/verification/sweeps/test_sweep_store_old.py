@@ -22,7 +22,7 @@ MATRICES = {"S1": np.diag([3.0, 2.0]), "S2": np.eye(2), "x": np.zeros(1), "load2
 
 #: What the old store has, and its rows as they were made.
 GRID = {"theta": ["0.3", "0.95"], "refine": [0, 8]}
-OLD = Path(__file__).with_name("store_of_0_1_0.sql").read_text("utf-8")
+OLD = (Path(__file__).parents[1] / "store_of_0_1_0.sql").read_text("utf-8")
 FACTORS = [0.8454876938196176, 0.7742401092422802, None, None]
 
 TOLD = "{}: {} of these rows are of version {} with other numerics; they are not used, and stay"

@@ -22,7 +22,7 @@ from fem1d2d.proofs.exact import Shapes, fractions
 from fem1d2d.proofs.loewner import Elimination, positive_definite
 from fem1d2d.proofs.proved import enclose_largest, inverse, root
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 KINDS = (
     "definite",
     "definite inside",

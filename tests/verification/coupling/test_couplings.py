@@ -15,7 +15,7 @@ import verification as vf
 from verification.coupling.ends import Box, cheapest, common, dearest, of_ratio
 from verification.problem.tables import ProblemError
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 
 
 @pytest.fixture

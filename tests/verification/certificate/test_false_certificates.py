@@ -19,7 +19,7 @@ from verification.algorithm.affine_piece import Piece
 from verification.certificate import check
 from verification.contact.active_set import Pattern
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 TINY = blocks(cells=[[1, 1], [1, 2]], contact={"friction": "0.3", "radius": "0.6"}, iteration={"theta": "0.2"})
 SLIDING = blocks(cells=[[2, 1], [1, 1]], contact={"friction": 0}, iteration={"neumann_body": 1, "theta": "0.2"})
 PROBLEMS = {"friction": TINY, "grids that differ": {**TINY, "body1": SLIDING["body1"]}, "no friction": SLIDING}

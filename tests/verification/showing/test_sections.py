@@ -36,7 +36,7 @@ from verification.show.parts import (
     table,
 )
 
-ROOT = Path(__file__).parents[2] / "verification"
+ROOT = Path(__file__).parents[3] / "verification"
 ALL = KINDS | OTHERS
 
 #: No figure: none is asked for.

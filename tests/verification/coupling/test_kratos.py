@@ -72,7 +72,7 @@ def predicted(problem):
 
 #: The couplings on the page, and what was counted in Kratos there: by name and Neumann body, in the order of METHODS.
 ON_PAGE = {"tied": PLATES, "contact without friction": PLATES.changed(friction=0)}
-PAGE = (Path(__file__).parents[2] / "docs" / "coupling.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "coupling.md").read_text("utf-8")
 COUNTED = ast.literal_eval(re.search(r"^counted = (\{.*?^\})$", PAGE, re.S | re.M)[1])
 
 

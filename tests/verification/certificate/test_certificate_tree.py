@@ -21,7 +21,7 @@ from verification.certificate.contraction import check_again
 from verification.ledger.cases import problem as random_problem
 from verification.semidefinite import lipschitz
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 RUBBING = blocks(cells=[[1, 1], [1, 1]], contact={"friction": "1/2", "radius": "0.6"}, iteration={"theta": "0.3"})
 PROBLEMS = {
     "one grid": RUBBING,

@@ -24,7 +24,7 @@ from verification.sections.bounds import on_the_printed_proof, thetas
 from verification.sections.comparison import NAMES, WORDS
 from verification.show.layout import text
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 #: Titles that could leave their place in a file.
 TITLES = {

@@ -228,7 +228,7 @@ def test_of_several_lines_the_one_with_the_law_is_named():
 
 # --- what the page and the built-in files say -------------------------------------------------------------------------
 
-PAGE = (Path(__file__).parents[2] / "docs" / "problem_file.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "problem_file.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", ["section6", "inside"])

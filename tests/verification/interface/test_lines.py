@@ -30,7 +30,7 @@ from verification.show.layout import text
 ROTATED = 1e-9
 
 #: Two meshes that Gmsh made, joined along an arc.
-PIN = Path(__file__).parents[2] / "docs" / "meshes" / "pin.toml"
+PIN = Path(__file__).parents[3] / "docs" / "meshes" / "pin.toml"
 
 #: Size of the displacements that supports prescribe here.
 MOVED = 0.01

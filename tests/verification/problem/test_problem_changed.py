@@ -269,7 +269,7 @@ def test_an_unknown_name_is_answered_with_the_known_ones(name):
 
 
 def test_the_page_of_the_problem_file_shows_what_the_program_answers():
-    page = Path(__file__).parents[2] / "docs" / "problem_file.md"
+    page = Path(__file__).parents[3] / "docs" / "problem_file.md"
     found = doctest.testfile(str(page), module_relative=False)
     assert found.attempted >= 5
     assert found.failed == 0

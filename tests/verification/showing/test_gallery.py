@@ -13,7 +13,7 @@ import verification as vf
 from fem1d2d import mesh_files
 from verification.interface.assembly import discretise
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 RECORD = json.loads((BENCHMARKS / "records" / "advice" / "gallery.json").read_text("utf-8"))["rows"]
 NIGHT = os.environ.get("HYPOTHESIS_PROFILE") == "nightly"
 

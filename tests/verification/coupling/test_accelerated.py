@@ -17,7 +17,7 @@ from verification.coupling.log_lines import PatternError, form_of_pattern
 from verification.problem.tables import ProblemError
 
 MODES = (0.2, 0.5, 1.1, 3.0)
-KRATOS = Path(__file__).parent / "kratos_logs"
+KRATOS = Path(__file__).parents[1] / "kratos_logs"
 
 
 def aitken(modes, first=0.5, steps=12):

@@ -16,7 +16,7 @@ import verification as vf
 from verification.algorithm.monolithic import ContactSystem, SolveError, contact_system
 from verification.interface.assembly import discretise
 
-REFERENCE = Path(__file__).parent / "reference_local_coulomb.csv"
+REFERENCE = Path(__file__).parents[1] / "reference_local_coulomb.csv"
 
 
 def agree(one: vf.Run | vf.Solution, other: vf.Run | vf.Solution, within: float) -> None:
