@@ -26,8 +26,8 @@ from fractions import Fraction
 from functools import cache
 from itertools import count
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
+from types import NoneType, SimpleNamespace, UnionType
+from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
@@ -257,7 +257,7 @@ def annotation(cls: type, attribute: str) -> Any:
         written = function.__annotations__["return"] if function else written
         if written is not None:
             known = {**vars(sys.modules[base.__module__]), **vars(base)}
-            return eval(written, known) if isinstance(written, str) else written
+            return get_type_hints(SimpleNamespace(__annotations__={attribute: written}), known)[attribute]
     raise AttributeError(f"{cls.__name__}.{attribute} has no type")
 
 
