@@ -14,7 +14,9 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 UV     := uv==0.13.9
 JOBS   ?= auto
-INSTALL = $(BIN)/python .ci/install.py $(1) $(UV)
+# A lock holds all that is needed, so nothing is resolved; a module is compiled when it is first imported.
+INSTALL = $(BIN)/python -m pip --quiet --disable-pip-version-check install --no-deps --no-compile --editable . \
+	--requirement $(1) && $(BIN)/python -m pip check
 LOCKS  := requirements.lock requirements-test.lock requirements-run.lock
 NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 

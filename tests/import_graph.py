@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
+
+PACKAGES = ("fem1d2d", "ndtheory", "verification")
 
 COMPUTED = "a name computed at run time"
 
@@ -16,13 +18,16 @@ class Import(NamedTuple):
 
     Attributes
     ----------
+    module : str
+        Who imports.
     line : int
     name : str
-        Absolute; ``from a import b`` counts as a.b.
+        What; absolute, and ``from a import b`` counts as a.b.
     kind : {'module', 'function', 'types', 'name'}
         Where it stands: in the module, in a function, under TYPE_CHECKING; or a call of ``import_module``.
     """
 
+    module: str
     line: int
     name: str
     kind: Kind
@@ -46,22 +51,42 @@ def written_name(call: ast.Call) -> str:
     return name.value if isinstance(name, ast.Constant) else COMPUTED
 
 
-def imports(module: str, tree: ast.AST, is_package: bool = False) -> Iterator[Import]:
+def imports(module: str, text: str, is_package: bool = False) -> Iterator[Import]:
     """All that a source imports, wherever it is indented."""
-    waiting: list[tuple[ast.AST, Kind]] = [(tree, "module")]
+    waiting: list[tuple[ast.AST, Kind]] = [(ast.parse(text), "module")]
     while waiting:
         node, kind = waiting.pop()
         if isinstance(node, ast.Import):
-            yield from (Import(node.lineno, alias.name, kind) for alias in node.names)
+            yield from (Import(module, node.lineno, alias.name, kind) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             parents = module.split(".")[: None if is_package else -1]
             start = parents[: len(parents) - node.level + 1] if node.level else []
             base = [*start, *([node.module] if node.module else [])]
-            yield from (Import(node.lineno, ".".join([*base, alias.name]), kind) for alias in node.names)
+            yield from (Import(module, node.lineno, ".".join([*base, alias.name]), kind) for alias in node.names)
         elif isinstance(node, ast.Call) and called(node) in ("import_module", "__import__"):
-            yield Import(node.lineno, written_name(node), "name")
+            yield Import(module, node.lineno, written_name(node), "name")
         elif isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
             kind = "function"
         elif kind == "module" and isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
             kind = "types"
         waiting.extend((child, kind) for child in reversed(list(ast.iter_child_nodes(node))))
+
+
+def edges(sources: Mapping[str, str], packages: frozenset[str] = frozenset()) -> list[Import]:
+    """Every import of some sources; of a name in a module of ours the module.
+    ``packages`` are those of the modules that are packages, as relative imports need it.
+    """
+
+    def ours(name: str) -> str:
+        """The longest beginning of a name that is a module."""
+        while name not in sources and "." in name:
+            name = name.rpartition(".")[0]
+        return name
+
+    found = []
+    for module, text in sources.items():
+        for each in imports(module, text, module in packages):
+            target = ours(each.name) if each.name.split(".")[0] in PACKAGES else each.name
+            if target != module:
+                found.append(Import(module, each.line, target, each.kind))
+    return found

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 
 #: Seconds after which a process is taken to hang.  The slowest needs a few on an idle processor; a loaded one may take
@@ -56,11 +56,22 @@ def environment(**more: str) -> dict[str, str]:
 
 
 @contextmanager
-def running(code: str, *arguments: object, flags: Sequence[str] = (), **options) -> Iterator[subprocess.Popen]:
-    """A fresh interpreter in a process group of its own; at the end of the block the whole group is ended."""
+def running(
+    code: str, *arguments: object, flags: Sequence[str] = (), first: Callable[[], object] = lambda: None, **options
+) -> Iterator[subprocess.Popen]:
+    """A fresh interpreter in a process group of its own; at the end of the block the whole group is ended.
+
+    It calls ``first`` before it is one.  What `nohup` or a shell in the background ignores is inherited, and ends it.
+    """
+
+    def begin() -> None:
+        for number in (signal.SIGHUP, signal.SIGINT):
+            signal.signal(number, signal.SIG_DFL)
+        first()
+
     command = [sys.executable, *flags, "-c", textwrap.dedent(code), *map(str, arguments)]
     usual = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": environment()}
-    with subprocess.Popen(command, start_new_session=True, **usual | options) as process:
+    with subprocess.Popen(command, start_new_session=True, preexec_fn=begin, **usual | options) as process:
         try:
             yield process
         finally:

@@ -2,7 +2,6 @@
 
 import ast
 import re
-import runpy
 import subprocess
 import sys
 import tomllib
@@ -121,58 +120,15 @@ def test_readme_names_every_extra_and_asks_for_no_other():
     assert set(re.findall(r"pip install '?[\w.]+\[(\w+)\]", read("README.md"))) <= extras
 
 
-INSTALL = SimpleNamespace(**runpy.run_path(str(ROOT / ".ci" / "install.py")))
-
-
-def test_what_pip_is_told_of_indexes_and_certificates_is_handed_on_to_uv():
-    listed = """\
-global.index-url='https://a.example.org/simple'
-global.trusted-host='a.example.org b.example.org'
-install.find-links='one two'
-:env:.cert='/etc/ours.pem'
-:env:.index-url='https://b.example.org/simple'
-:env:.disable-pip-version-check='1'
-"""
-    assert INSTALL.settings(listed) == {
-        "UV_DEFAULT_INDEX": "https://b.example.org/simple",
-        "UV_INSECURE_HOST": "a.example.org b.example.org",
-        "UV_FIND_LINKS": "one,two",
-        "SSL_CERT_FILE": "/etc/ours.pem",
-    }
-    assert INSTALL.settings("") == {}
-
-
-@pytest.mark.parametrize("name", ["extra-index-url", "no-binary", "target", "a-setting-of-tomorrow"])
-def test_a_setting_that_uv_lacks_is_named(name):
-    with pytest.raises(ValueError, match=name):
-        INSTALL.settings(f"global.index-url='https://a.example.org'\nglobal.{name}='x'\n")
-
-
 @pytest.mark.parametrize(
-    ("fails", "listed", "told"),
-    [
-        (None, "", ""),
-        (None, "global.no-binary=':all:'\n", "uv has no setting like pip's no-binary"),
-        ("--only-binary", "", "pip finds no wheel of uv==1.2"),
-        ("--python", "", "uv: no route to the index"),
-    ],
-    ids=["uv installs", "a setting of pip", "no wheel", "uv fails"],
+    ("target", "lock"),
+    [("demo", "requirements-run.lock"), ("test", "requirements-test.lock"), ("docs", "requirements.lock")],
 )
-def test_pip_installs_the_lock_where_uv_does_not_and_says_why_in_one_line(monkeypatch, capsys, fails, listed, told):
-    ran = []
-
-    def run(command, **options):
-        ran.append(command)
-        return SimpleNamespace(returncode=int(fails in command), stdout=listed, stderr="no route\n  to the index\n")
-
-    monkeypatch.setattr(subprocess, "run", run)
-    monkeypatch.setattr(sys, "argv", ["install.py", "some.lock", "uv==1.2"])
-    INSTALL.main()
-    by = [command[2] for command in ran if "some.lock" in command]
-    assert by == (["uv"] if not told else ["uv", "pip"] if fails == "--python" else ["pip"])
-    assert all("--no-deps" in command for command in ran if "some.lock" in command)
-    assert ran[-1][-1] == "check"
-    assert capsys.readouterr().out == (f"{told}; pip installs some.lock, which takes longer\n" if told else "")
+def test_a_lock_is_installed_by_pip_alone_which_knows_the_settings_of_the_machine(target, lock):
+    dry = ["make", "--dry-run", "--always-make", target]
+    told = subprocess.run(dry, cwd=ROOT, env=environment(), capture_output=True, text=True, check=True).stdout
+    [line] = [line for line in told.splitlines() if "install" in line]
+    assert re.search(rf"-m pip .*install .*--no-deps .*--requirement {lock} && .* -m pip check$", line)
 
 
 def test_the_least_promised_python_is_the_one_that_is_needed():

@@ -65,6 +65,15 @@ def test_what_a_shell_exports_reaches_neither_the_children_of_tests_nor_what_mak
     assert [sorted(EXPORTED.keys() & names) for names in (seen, told)] == [["LANG"]] * 2
 
 
+def test_children_of_tests_that_were_started_by_nohup_or_in_the_background_end_by_signals():
+    for number in (signal.SIGHUP, signal.SIGINT):
+        before = signal.signal(number, signal.SIG_IGN)
+        try:
+            assert ended(f"import os, time; os.kill(os.getpid(), {int(number)}); time.sleep(9)").returncode == -number
+        finally:
+            signal.signal(number, before)
+
+
 def test_continuous_integration_runs_the_tests_in_the_shell_of_a_stranger():
     """The lines of the script that begin the tests, with a command in place of make."""
     lines = (ROOT / ".ci" / "run").read_text("utf-8").splitlines()

@@ -145,7 +145,7 @@ def test_a_status_survives_streams_that_are_closed_or_unread_but_an_answer_that_
     unread, status, more
 ):
     ends = lambda **streams: start("ends", status, code=ENDS, env=environment(**more), **streams).returncode
-    closed = lambda low: ends(preexec_fn=lambda: os.closerange(low, 3))
+    closed = lambda low: ends(first=lambda: os.closerange(low, 3))
     assert ends(stdout=unread, stderr=unread) == (status or 141)
     if AT_NIGHT or not (status or more):
         assert ends(stderr=unread) == status
