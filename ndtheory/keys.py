@@ -29,11 +29,15 @@ from pathlib import Path
 from types import NoneType, SimpleNamespace, UnionType
 from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from ndtheory.number import Number
+
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 
 #: The types of Python as those of the tables; a class of parts is named, or an object with keys of its own.
-TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"}
+TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"} | {
+    Number: "Number"
+}
 
 #: The value of a key that is left out although its value could also be null.
 ABSENT: Any = object()
@@ -51,8 +55,9 @@ class Key:
         Its meaning and its unit; empty where there is none.
     null, absent : str or None
         When the value is null, and when the key is left out; None for never.
-    why : str or function of the result
-        The reason beside a null; the result's own ``reason`` by this name goes first, ``null`` comes last.
+    why : str or function of the result, or None
+        The reason beside a null; the result's own ``reason`` by this name goes first, ``null`` comes last.  None where
+        no reason stands beside it.
     name : str
         Its name, with dots for objects inside, where that is not the name of the field.
     of : function, optional
@@ -61,17 +66,20 @@ class Key:
         Its type, where that does not follow from the annotation.
     spread : bool
         True if the value is a part whose keys stand among those of the result.
+    inside : dict of Key, optional
+        The keys of a dictionary, or of each one in a list, with their types.
     """
 
     says: str = ""
     unit: str = ""
     null: str | None = None
     absent: str | None = None
-    why: str | Callable[[Any], str] = ""
+    why: str | Callable[[Any], str] | None = ""
     name: str = ""
     of: Callable[[Any], Any] | None = None
     type: str = ""
     spread: bool = False
+    inside: Mapping[str, Key] = field(default_factory=dict)
     order: int = field(default_factory=lambda: next(_order))
 
     def reason(self, result: Any, name: str) -> str:
@@ -80,6 +88,15 @@ class Key:
         if own is not None:
             return own
         return self.why(result) if callable(self.why) else self.why or self.null or ""
+
+    @property
+    def explained(self) -> bool:
+        """True if a reason stands beside a null."""
+        return self.null is not None and self.why is not None
+
+    def row(self, name: str, kind: str) -> Row:
+        """Its row in a table."""
+        return Row(keys=(name,), type=kind, unit=self.unit, says=self.says, null=self.null, absent=self.absent)
 
 
 def _once(compute: Callable[[type], T]) -> Callable[[type], T]:
@@ -145,7 +162,7 @@ def document(result: Any) -> dict[str, Any]:
         above, _, last = name.rpartition(".")
         inside = _inside(found, above)
         inside[last] = plain(value)
-        if inside[last] is None and one.null is not None:
+        if inside[last] is None and one.explained:
             inside["reason"][last] = one.reason(result, name)
     for above in explained:  # it comes last
         inside = _inside(found, above)
@@ -165,7 +182,7 @@ def _inside(found: dict[str, Any], above: str) -> dict[str, Any]:
 def _explained(cls: type) -> tuple[str, ...]:
     """The objects of a document that have reasons: those with a key that may be null, unless it has its own."""
     names = {one.name or attribute: one for attribute, one in keys(cls).items()}
-    found = dict.fromkeys(name.rpartition(".")[0] for name, one in names.items() if one.null is not None)
+    found = dict.fromkeys(name.rpartition(".")[0] for name, one in names.items() if one.explained)
     return tuple(above for above in found if f"{above}.reason".lstrip(".") not in names)
 
 
@@ -240,7 +257,8 @@ def _rows(cls: type) -> Iterator[Row]:
         if one.spread:
             yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,)),)
             continue
-        yield Row(keys=(name,), type=kind, unit=one.unit, says=one.says, null=one.null, absent=one.absent)
+        yield one.row(name, kind)
+        yield from (each.row(f"{name}.{below}", each.type) for below, each in one.inside.items())
         for row in _rows(inside) if inside else ():
             below = f"{name}.*" if kind.startswith("map") else name
             yield replace(row, keys=tuple(f"{below}.{each}" for each in row.keys))

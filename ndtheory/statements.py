@@ -15,60 +15,52 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal
 
-Fault = Literal["false as printed", "does not follow", "gap", "typo"]
+from ndtheory.keys import ABSENT, Part, key
 
+Fault = Literal["false as printed", "does not follow", "gap", "typo"]
 
 #: The texts of a statement that may be quoted.
 TEXTS = ("title", "claims", "wrong", "repair", "proof", "note")
 
 
+#: What keys share that only a statement with a fault has.
+IF_FAULT: dict[str, Any] = {"default": "", "absent": "where there is no fault", "of": lambda text: text or ABSENT}
+
+
 @dataclass(frozen=True, kw_only=True)
-class Statement:
+class Statement(Part):
     """A statement in our own words, with formulas in TeX.
 
     Attributes
     ----------
-    id : str
-        ``"5.30"``, ``"prop-5.6.2"``, ``"C5"``, ``"case-2-1"``, ``"fig-10"``; own facts begin with ``x-``.
-    label : str
-        The paper's.
-    kind : str
-        definition, law, algorithm, equation, inequality, constant, case, lemma, proposition, theorem, remark,
-        experiment or own.
-    verdict : str
-        The recorded one; empty where none is recorded.
-    title, claims : str
-        What it is about, in a few words; what it says.
-    short : str
-        The title in at most four words without formulas; empty where the title is such.
-    leans_on : tuple of str
-        Statements that its proof uses.
     fault : {'false as printed', 'does not follow', 'gap', 'typo'} or None
         A counterexample exists; the step is broken; a hypothesis or argument is missing; a sign or an index that the
         rest of the paper contradicts.
     same_as : str
         The statement whose fault it inherits; empty where the fault is its own.
-    wrong, repair, proof : str
-        Where there is a fault: what is wrong, the repaired form, its proof.
     reading : str
         What a definition or a cited result rests on.
-    note : str
-        What else a reader should know; mostly empty.
+    verdict : str
+        The recorded one; empty where none is recorded.
+    short : str
+        The title in at most four words without formulas; empty where the title is such.
     """
 
-    id: str
-    label: str
-    kind: str
-    title: str
-    claims: str
-    leans_on: tuple[str, ...] = ()
-    fault: Fault | None = None
+    id: str = key("as `5.30`, `prop-5.6.2`, `C5`, `case-2-1`, `fig-10`; own facts begin with `x-`")
+    label: str = key("the paper's, as `(5.30)`")
+    kind: str = key("definition, equation, inequality, theorem and so on")
+    title: str = key("in our own words")
+    claims: str = key("in our own words")
+    leans_on: tuple[str, ...] = key("ids that its proof uses", default=())
+    fault: Fault | None = key(
+        "`false as printed`, `does not follow`, `gap` or `typo`", default=None, absent="where there is no fault"
+    )
+    wrong: str = key("what is wrong", **IF_FAULT)
+    repair: str = key("its repaired form", **IF_FAULT)
+    proof: str = key("the proof of the repair", **IF_FAULT)
+    note: str = key("what else a reader should know; mostly empty", default="")
     same_as: str = ""
-    wrong: str = ""
-    repair: str = ""
-    proof: str = ""
     reading: str = ""
-    note: str = ""
     verdict: str = ""
     short: str = ""
 

@@ -31,12 +31,6 @@ TYPES: dict[str, JsonSchema] = {
     "free": {"type": ["array", "boolean", "number", "object", "string"]},
 }
 
-#: The rows with which the table of a document begins.
-HEADER = (
-    Row(keys=(f"{INCLUDED}Header",)),
-    Row(keys=("problem",), type="Problem", says="what the result is about", absent="where that is no problem file"),
-)
-
 #: How the type of an object begins that may be a list of a part instead.
 EITHER = "object, or list of "
 
@@ -56,10 +50,20 @@ def tables() -> dict[str, tuple[Row, ...]]:
     classes = {table: each for each in subclasses(Document) if keys.keys(each) and (table := each.key_table())}
     named = {name: each for cls in classes.values() for name, each in keys.parts(cls).items()}
     written = [name for name in found if name.startswith("ndtheory.")]
-    made = {name: HEADER + keys.rows(cls) for name, cls in classes.items()}
+    made = {name: tuple(_header(cls)) + keys.rows(cls) for name, cls in classes.items()}
     parts = {name: keys.rows(cls) for name, cls in named.items()}
     rest = {name: each for name, each in found.items() if name not in written}
     return {name: found[name] for name in written} | made | rest | parts
+
+
+def _header(cls: type[Document]) -> Iterator[Row]:
+    """Yield the rows with which the table of a document begins; without a field for a problem it never has one."""
+    yield Row(keys=(f"{INCLUDED}Header",))
+    if problem := vars(cls)["__dataclass_fields__"].get("problem"):
+        absent = "where that is no problem file" if "None" in problem.type else None
+        yield Row(keys=("problem",), type="Problem", says="what the result is about", absent=absent)
+    if cls.kind:
+        yield Row(keys=("kind",), type="text", says=f"`{cls.kind}`")
 
 
 def subclasses(cls: type[Document]) -> Iterator[type[Document]]:

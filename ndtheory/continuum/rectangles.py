@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from ndtheory.constants import EnergyConstants
 from ndtheory.continuum.calibration import Calibration, loss
@@ -29,6 +30,7 @@ from ndtheory.continuum.strip import Strip, largest_ratio_of_strips, largest_smo
 from ndtheory.continuum.wedges import Wedge, end_bound
 from ndtheory.energy_norms import EnergyBounds, evaluate_energy
 from ndtheory.errors import HypothesisError
+from ndtheory.keys import Part, key
 from ndtheory.moduli import Moduli, mirror
 from ndtheory.number import Number, Numeric, above, below
 
@@ -123,41 +125,51 @@ class TwoRectangles:
         return self.interval[0] - self.neumann.left, self.neumann.right - self.interval[1]
 
 
+def upper(value: Fraction) -> Number:
+    """A number that is proved to be at most a rational."""
+    hi = above(value)
+    return Number(value=hi, hi=hi, level="guaranteed")
+
+
+def lower(value: Fraction) -> Number:
+    """A number that is proved to be at least a rational."""
+    lo = below(value)
+    return Number(value=lo, lo=lo, level="guaranteed")
+
+
+def _root(square: Fraction) -> Number:
+    return upper(Fraction(Interval.of(square).sqrt().hi))
+
+
+#: What keys of upper bounds share; their reasons stand beside those of the document.
+AT_MOST: dict[str, Any] = {"of": upper, "unit": "1", "type": "Number", "why": None}
+
+
 @dataclass(frozen=True, kw_only=True)
-class ContinuumConstants:
+class ContinuumConstants(Part):
     """Upper bounds of the constants in energy norms, exact rationals, and a lower bound of rho.
 
-    Attributes
-    ----------
-    C_s_square : Fraction
-        Unit stress/length.
-    C_t1_square, C_t2_square : Fraction
-        Contact body and Neumann body, unit length/stress.
-    K : tuple of Fraction
-        Of both bodies: ``C_ta^2 G/d``.
-    strips : Fraction
-        R.
-    cut_off : Fraction or None
-        eps; None where Gamma_c reaches an end of the Neumann body.
-    rho : Fraction or None
-        ``(1 + eps) R``; None where eps is.
-    rho_ends : Fraction
-        A lower bound of rho, from the wedges at the ends of Gamma_c.
-    rho_normal : Fraction or None
-        s; None where the mirror image does not fit.
-    reason : dict
-        Why a bound is None.
+    Those of C_s, C_t1 and C_t2 are squares here, and roots in documents; ``reason`` says why a bound is None.
     """
 
-    C_s_square: Fraction
-    C_t1_square: Fraction
-    C_t2_square: Fraction
-    K: tuple[Fraction, Fraction]
-    strips: Fraction
-    cut_off: Fraction | None
-    rho: Fraction | None
-    rho_ends: Fraction
-    rho_normal: Fraction | None
+    C_s_square: Fraction = key("at most", name="C_s", unit="√(stress/length)", of=_root, type="Number")
+    C_t1_square: Fraction = key("at most; contact body", name="C_t1", unit="√(length/stress)", of=_root, type="Number")
+    C_t2_square: Fraction = key("at most; Neumann body", name="C_t2", unit="√(length/stress)", of=_root, type="Number")
+    K: tuple[Fraction, Fraction] = key(
+        r"the rationals $K$ of both bodies, $C_t^2 \le (d/G)K$", unit="1", type="list of text"
+    )
+    strips: Fraction = key("$R$, at most: the contact strip's form over the Neumann strip's", **AT_MOST)
+    cut_off: Fraction | None = key(
+        r"$\varepsilon$, at most", null=r"where $\Gamma_c$ reaches an end of the Neumann body", **AT_MOST
+    )
+    rho: Fraction | None = key(r"at most, $(1 + \varepsilon)R$", null=r"where $\varepsilon$ is", **AT_MOST)
+    rho_ends: Fraction = key(
+        r"at least: the bound from the wedges at the ends of $\Gamma_c$; not less than `rho_least`",
+        unit="1",
+        of=lower,
+        type="Number",
+    )
+    rho_normal: Fraction | None = key("at most, by a mirror image", null="where it does not fit", **AT_MOST)
     reason: dict[str, str]
 
     def kappa(self, friction: Fraction) -> tuple[Fraction, Fraction]:
@@ -265,18 +277,6 @@ def continuum_constants(
         rho_normal=mirrored,
         reason=reason,
     )
-
-
-def upper(value: Fraction) -> Number:
-    """A number that is proved to be at most a rational."""
-    hi = above(value)
-    return Number(value=hi, hi=hi, level="guaranteed")
-
-
-def lower(value: Fraction) -> Number:
-    """A number that is proved to be at least a rational."""
-    lo = below(value)
-    return Number(value=lo, lo=lo, level="guaranteed")
 
 
 def friction_threshold(constants: ContinuumConstants) -> Number:

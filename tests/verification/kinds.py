@@ -12,7 +12,7 @@ from verification.bounds.bound import Region, Subject
 from verification.bounds.table import Calculated
 from verification.certificate.continuum import certify_continuum
 from verification.ledger.evidence import Evidence
-from verification.ledger.rows import Row
+from verification.ledger.rows import Finding
 from verification.registry import BOUNDS
 from verification.reproduce import reproduce
 from verification.sweeps.grid import SweepGrid
@@ -53,7 +53,9 @@ def a_ledger(shown: vf.Problem, *, whole: bool) -> vf.Ledger:
     for id, one in statements().items():
         found = Evidence(method="symbolic", of="printed", holds=False, text="made up", data=at)
         before = "INCONCLUSIVE" if id == "5.30" else recorded()[id]
-        rows.append(Row(statement=one, evidence=(found,), verdict=recorded()[id], method="symbolic", recorded=before))
+        rows.append(
+            Finding(statement=one, evidence=(found,), verdict=recorded()[id], method="symbolic", recorded=before)
+        )
     chosen = [row for row in rows if whole or row.statement.id in ("5.12", "5.30")]
     return vf.Ledger(rows=tuple(chosen), level="quick", units=shown.units)
 

@@ -8,15 +8,14 @@ a theta that is proved to contract in the continuum does not contract on the mes
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
-from ndtheory.continuum.intervals import Interval
 from ndtheory.continuum.rectangles import (
     ContinuumConstants,
     Rectangle,
@@ -27,9 +26,10 @@ from ndtheory.continuum.rectangles import (
     statement,
     upper,
 )
+from ndtheory.keys import Part, key
 from ndtheory.moduli import half_planes
 from verification.certificate.calibrating import for_cut_off, for_traces
-from verification.constants.cells import OfCells, rho_of_cells
+from verification.constants.cells import rho_of_cells
 from verification.constants.measuring import of_energy
 from verification.document import Document
 from verification.interface.pair import pair_from
@@ -51,158 +51,114 @@ NOT_CLAIMED = (
 #: Cells along Gamma_c, and of both bodies, up to which rho is computed: a few seconds.
 MOST_ALONG, MOST_CELLS = 320, 30_000
 
-#: Why no theta is judged on the mesh.
-NO_THETA = "the file gives no theta, and none is proved in the continuum"
+#: What keys share that are null together.
+MESH: dict[str, Any] = {"default": None, "why": lambda mesh: mesh.why}
+MEASURED = MESH | {"unit": "1", "null": "where `mesh.interface_nodes` is"}
+OF_CELLS = MEASURED | {"null": "where the grids have no ratio that is done", "why": lambda mesh: mesh.why_no_cells}
+IF_INTERVAL: dict[str, Any] = {"unit": "1", "null": "where `interval` is"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class FileMesh:
-    """Contact nodes and constants in energy norms of the mesh of a file, in doubles; ``why`` they were not computed.
+class FileMesh(Part):
+    """The mesh of a file, in doubles; ``why`` it was not measured, and ``why_no_cells``."""
 
-    ``cells`` has rho of half-planes of its cells, once halved.
-    """
-
-    interface_nodes: int | None
-    energy: EnergyConstants | None
-    cells: OfCells
+    interface_nodes: int | None = key(
+        "contact nodes of the file's mesh", null="where it is too fine for a quick answer, or refused", **MESH
+    )
+    rho: Number | None = key(r"$\rho$ of the file's mesh", **MEASURED)
+    rho_normal: Number | None = key(r"$\rho_N$ of the file's mesh", **MEASURED)
+    rho_cells: Number | None = key(
+        "lower bound of the limit of `mesh.rho` on finer meshes of such cells, as in the constants", **OF_CELLS
+    )
+    rho_normal_cells: Number | None = key("the same of `mesh.rho_normal`", **OF_CELLS)
+    theta_limit: float | None = key(
+        r"$2/(1+\rho)$ of the mesh, with $\rho_N$ without friction: where all of $\Gamma_c$ sticks no $\theta$ from"
+        " there on contracts",
+        **MEASURED,
+    )
+    theta: float | None = key(
+        r"the file's $\theta$, with `auto` `theta_proved`",
+        unit="1",
+        null="where there is none",
+        why="the file gives no theta, and none is proved in the continuum",
+    )
+    contracts: bool | None = key(
+        "whether one step contracts on the mesh at `mesh.theta`",
+        default=None,
+        null="where neither `mesh.theta_limit` nor the bound in energy norms of the mesh decides",
+        why=lambda mesh: mesh.why or mesh.why_undecided,
+    )
     why: str = ""
+    why_no_cells: str = ""
 
     @property
-    def theta_limit(self) -> float | None:
-        """``2/(1 + rho)``, with rho_normal without friction: where all of Gamma_c sticks no larger theta contracts."""
-        return None if self.energy is None else float(2 / (1 + self.energy.at_work))
-
-    def contracts(self, theta: float | None) -> bool | None:
-        """True if one step contracts at a theta; None where neither the limit nor the bound in energy norms decides."""
-        if self.energy is None or self.theta_limit is None or theta is None:
-            return None
-        if theta >= self.theta_limit:
-            return False
-        return True if evaluate_energy(self.energy, theta).verdict == "contraction" else None
-
-    def to_dict(self, theta: float | None) -> dict[str, Any]:
-        """The object ``mesh`` of the document."""
-        contracts, numbers = self.contracts(theta), ("rho", "rho_normal")
-        reason = dict.fromkeys(("interface_nodes", *numbers, "theta_limit"), self.why) if self.energy is None else {}
-        if contracts is None:
-            undecided = "theta is below the limit, and the bound in energy norms does not prove contraction there"
-            reason["contracts"] = self.why or (undecided if theta is not None else NO_THETA)
-        of_cells, none = self.cells.objects()
-        return {
-            "interface_nodes": self.interface_nodes,
-            **{name: self.number(name) for name in numbers},
-            **of_cells,
-            "theta_limit": self.theta_limit,
-            "theta": theta,
-            "contracts": contracts,
-            "reason": reason | none | ({} if theta is not None else {"theta": NO_THETA}),
-        }
-
-    def number(self, name: str) -> dict[str, Any] | None:
-        """``rho`` or ``rho_normal`` of the mesh with its level."""
-        value = None if self.energy is None else getattr(self.energy, name)
-        return None if value is None else Number.of_float(float(value)).to_dict()
+    def why_undecided(self) -> str:
+        """Why it is not known whether one step contracts."""
+        if self.theta is None:
+            return "the file gives no theta, and none is proved in the continuum"
+        return "theta is below the limit, and the bound in energy norms does not prove contraction there"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ContinuumCertificate(Document):
     """Bounds that are guaranteed for the continuum.
 
-    ``energy`` is the theorem for the upper bounds of the constants, None where rho is not bounded; ``mesh`` is rho on
-    the mesh of the file, in doubles, which may be larger than the continuum's.
+    ``energy`` is the theorem for the upper bounds of the constants, None where rho is not bounded.
     """
 
     schema: ClassVar[str] = "ndtheory.certificate/1"
+    kind: ClassVar[str] = "continuum"
 
     problem: Problem
-    constants: ContinuumConstants
     energy: EnergyBounds | None
-    mesh: FileMesh
+    constants: ContinuumConstants = key()
+    rho_least: Number = key("at least: the bound from half-planes", unit="1", name="constants.rho_least")
+    kappa_1: Number = key("at most, at the file's friction", unit="1", name="constants.kappa_1")
+    kappa_2: Number = key("at most, at the file's friction", unit="1", name="constants.kappa_2")
+    friction: float = key("$k$, the largest one where it varies", unit="1")
+    friction_threshold: Number = key(r"at least: every small $\theta$ contracts for smaller $k$", unit="1")
+    friction_limit: Number | None = key(
+        r"at least: some $\theta$ contracts for smaller $k$",
+        unit="1",
+        null=r"without friction or without a bound of $\rho$",
+    )
+    solvable: bool = key("whether (P1) is proved to have exactly one solution")
+    interval: list[float] | None = key(r"every $\theta$ inside contracts", unit="1", null="where none is proved to")
+    theta_max_proved: Number | None = key("its upper end, at least", **IF_INTERVAL)
+    theta_proved: float | None = key(r"the $\theta$ with the least proved factor", **IF_INTERVAL)
+    factor_proved: Number | None = key("the factor there, at most", **IF_INTERVAL)
+    theta: float | None = key("the theta of the file", unit="1", null=r"for `auto` and without a bound of $\rho$")
+    factor: Number | None = key(
+        "the factor at `theta`, at most", unit="1", null="where `theta` is, or lies outside `interval`"
+    )
+    verdict: str = key(
+        r"`contraction` where it is proved at `theta`, with `auto` at some $\theta$; else `no conclusion`;"
+        " for the continuum"
+    )
+    mesh: FileMesh = key("the mesh of the file, whose rho may be larger than the continuum's")
+    not_claimed: str = key("what the numbers do not claim", default=NOT_CLAIMED)
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
         return dict(self.problem.units)
 
     @property
-    def friction(self) -> Fraction:
-        """k."""
-        return self.problem.contact.friction
-
-    @property
     def contracts(self) -> bool:
         """True if contraction is proved at the theta of the file; with ``auto`` at some theta."""
+        return self.verdict == "contraction"
+
+    @property
+    def reason(self) -> dict[str, str]:
+        """Why keys are null."""
+        none = self.constants.reason
         if self.energy is None:
-            return False
-        return self.energy.interval is not None if self.energy.theta is None else self.energy.verdict == "contraction"
-
-    @property
-    def theta_judged(self) -> float | None:
-        """The theta of the file; with ``auto`` the best one that is proved, None where there is none."""
-        theta = self.problem.iteration.theta
-        if theta != "auto":
-            return float(theta)
-        return None if self.energy is None else self.energy.theta_proved
-
-    @property
-    def solvable(self) -> bool:
-        """True if every small theta is proved to contract, so that (P1) has exactly one solution."""
-        threshold = friction_threshold(self.constants).lo
-        assert threshold is not None
-        return self.friction < Fraction(threshold)
-
-    @property
-    def _interval(self) -> list[float] | None:
-        if self.energy is None or self.energy.interval is None or self.energy.theta_max_proved is None:
-            return None
-        lo, hi = self.energy.interval[0], self.energy.theta_max_proved.lo
-        return None if hi is None else [math.nextafter(lo, 1.0) if lo else lo, hi]
+            return none | dict.fromkeys(OF_ENERGY, none.get("rho", ""))
+        none = none | {name: why for name, why in self.energy.reason.items() if name in OF_ENERGY}
+        return none if self.friction_limit else none | {"friction_limit": "no friction"}
 
     @property
     def summary(self) -> str:
-        said = friction_threshold(self.constants)
-        return f"{self.problem.title}, continuum: every small theta contracts for k < {said.lo:.4g}"
-
-    def content(self) -> dict[str, Any]:
-        c, k, energy = self.constants, self.friction, self.energy
-        limit = None if energy is None or energy.friction_limit_multiple is None else energy.friction_limit_multiple.lo
-        reason = dict(c.reason)
-        if energy is None:
-            reason |= dict.fromkeys(OF_ENERGY, c.reason.get("rho", ""))
-        else:
-            none = {name: why for name, why in energy.reason.items() if name in OF_ENERGY}
-            reason |= none | ({"friction_limit": "no friction"} if limit is None else {})
-        at_most = lambda value: None if value is None else upper(Fraction(value)).to_dict()
-        at_least = lambda value: None if value is None else lower(Fraction(value)).to_dict()
-        end = lambda name, side: getattr(getattr(energy, name, None), side, None)
-        uppers = {name: getattr(c, name) for name in ("strips", "cut_off", "rho", "rho_normal")}
-        for name in ("C_s", "C_t1", "C_t2"):
-            uppers[name] = Interval.of(getattr(c, f"{name}_square")).sqrt().hi
-        uppers["kappa_1"], uppers["kappa_2"] = c.kappa(k)
-        order = 1 if self.problem.contact_body == 1 else -1  # the contact body first
-        bodies = (self.problem.body1, self.problem.body2)[::order]
-        return {
-            "kind": "continuum",
-            "constants": {
-                **{name: at_most(value) for name, value in uppers.items()},
-                "K": [str(value) for value in c.K],
-                "rho_least": at_least(half_planes(*(body.moduli for body in bodies)).high),
-                "rho_ends": at_least(c.rho_ends),
-            },
-            "friction": float(k),
-            "friction_threshold": friction_threshold(c).to_dict(),
-            "friction_limit": None if limit is None else at_least(k * Fraction(limit)),
-            "theta": None if energy is None else energy.theta,
-            "solvable": self.solvable,
-            "interval": self._interval,
-            "theta_max_proved": at_least(end("theta_max_proved", "lo")),
-            "theta_proved": None if energy is None else energy.theta_proved,
-            "factor_proved": at_most(end("factor_proved", "hi")),
-            "factor": at_most(end("factor", "hi")),
-            "verdict": "contraction" if self.contracts else "no conclusion",
-            "mesh": self.mesh.to_dict(self.theta_judged),
-            "not_claimed": NOT_CLAIMED,
-            "reason": reason,
-        }
+        return f"{self.problem.title}, continuum: every small theta contracts for k < {self.friction_threshold.lo:.4g}"
 
 
 #: Keys of the document that need a bound of rho.
@@ -283,21 +239,53 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     ProblemError
         The theory does not apply to these bodies.
     """
-    model, theta = two_rectangles(problem), problem.iteration.theta
+    model, given, k = two_rectangles(problem), problem.iteration.theta, problem.contact.friction
     progress("bounding the constants of the continuum", None)
     constants = bounded(model)
-    energy = statement(constants, friction=problem.contact.friction, theta=None if theta == "auto" else theta)
-    mesh = file_mesh(problem, progress)
-    return ContinuumCertificate(problem=problem, constants=constants, energy=energy, mesh=mesh)
+    energy = statement(constants, friction=k, theta=None if given == "auto" else given)
+    threshold, kappas = friction_threshold(constants), constants.kappa(k)
+    assert threshold.lo is not None
+    inside = None if energy is None else energy.interval
+    theta = None if energy is None else energy.theta
+    proved = inside is not None if energy is None or theta is None else energy.verdict == "contraction"
+    best = None if energy is None else energy.theta_proved
+
+    def end(name: str, of: Callable[[Fraction], Number], side: str, times: Fraction = Fraction(1)) -> Number | None:
+        value = getattr(getattr(energy, name, None), side, None)
+        return None if value is None else of(times * Fraction(value))
+
+    highest = end("theta_max_proved", lower, "lo")
+    return ContinuumCertificate(
+        problem=problem,
+        energy=energy,
+        constants=constants,
+        rho_least=lower(half_planes(model.contact.body, model.neumann.body).high),
+        kappa_1=upper(kappas[0]),
+        kappa_2=upper(kappas[1]),
+        friction=float(k),
+        friction_threshold=threshold,
+        friction_limit=end("friction_limit_multiple", lower, "lo", k),
+        solvable=k < Fraction(threshold.lo),
+        interval=[math.nextafter(inside[0], 1.0) if inside[0] else 0.0, highest.value] if inside and highest else None,
+        theta_max_proved=highest,
+        theta_proved=best,
+        factor_proved=end("factor_proved", upper, "hi"),
+        theta=theta,
+        factor=end("factor", upper, "hi"),
+        verdict="contraction" if proved else "no conclusion",
+        mesh=file_mesh(problem, best if given == "auto" else float(given), progress),
+    )
 
 
-def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
+def file_mesh(problem: Problem, theta: float | None, progress: Progress = silent) -> FileMesh:
     """Condense the two rectangles of a problem on their meshes, each held only at its outer side, and find rho."""
     counts, cells = [body.cells or () for body in (problem.body1, problem.body2)], rho_of_cells(problem)
+    rho_cells, rho_normal_cells = (cells.numbers.get(name) for name in ("rho_cells", "rho_normal_cells"))
+    mesh = FileMesh(theta=theta, rho_cells=rho_cells, rho_normal_cells=rho_normal_cells, why_no_cells=cells.why)
     if max(max(own) for own in counts) > MOST_ALONG or sum(int(np.prod(own)) for own in counts) > MOST_CELLS:
         needed = f"up to {MOST_ALONG} cells along a side and {MOST_CELLS} in all"
         why = f"not computed beside a bound for the continuum: {needed} are; `ndtheory constants` finds rho"
-        return FileMesh(interface_nodes=None, energy=None, cells=cells, why=why)
+        return replace(mesh, why=why)
     progress("measuring rho on the mesh of the file", None)
     try:
         with one_thread():
@@ -305,7 +293,7 @@ def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
             grid = pair.contact.grid
             found = of_energy(pair, np.arange(grid.size) < grid.t)
     except ProblemError as error:
-        return FileMesh(interface_nodes=None, energy=None, cells=cells, why=f"the meshes are refused: {error}")
+        return replace(mesh, why=f"the meshes are refused: {error}")
     rho, rho_normal, k = found["rho_max"], found["rho_normal"], pair.friction
     assert rho is not None
     assert rho_normal is not None
@@ -315,4 +303,16 @@ def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
         kappas = {"kappa_1": k * C_s * C_t1, "kappa_2": k * C_s * C_t2}
     # equal up to rounding where nothing slides
     energy = EnergyConstants(rho=rho, rho_normal=min(rho_normal, rho), **kappas)
-    return FileMesh(interface_nodes=grid.n, energy=energy, cells=cells)
+    limit, contracts = float(2 / (1 + energy.at_work)), None
+    if theta is not None and theta >= limit:
+        contracts = False
+    elif theta is not None and evaluate_energy(energy, theta).verdict == "contraction":
+        contracts = True
+    return replace(
+        mesh,
+        interface_nodes=grid.n,
+        rho=Number.of_float(float(energy.rho)),
+        rho_normal=Number.of_float(float(min(rho_normal, rho))),
+        theta_limit=limit,
+        contracts=contracts,
+    )

@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
+from ndtheory.keys import Key, key, says
 from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
@@ -33,60 +35,90 @@ from verification.semidefinite.multipliers import QuadraticForms
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Checked(Document):
-    """Result of checking a certificate again.
-
-    Attributes
-    ----------
-    accepted, why : bool, str
-        True if its multipliers prove its claim for its bodies; why it is refused.
-    words, sha256 : str
-        The claim that was checked, and the hash of the bodies and what joins them.
-    same : bool or None
-        True if these are the bodies of the problem that was given with it; None without one.
-    """
+    """Result of checking a certificate again."""
 
     schema: ClassVar[str] = "ndtheory.certificate-check/1"
 
     units: Mapping[str, str]
-    accepted: bool
-    why: str
-    words: str
-    sha256: str
-    same: bool | None = None
+    accepted: bool = key("whether the multipliers prove the claim for the bodies of the certificate")
+    why: str = key("why not; empty where they do")
+    words: str = key("what was checked")
+    sha256: str = key("hash of the bodies and what joins them")
+    same: bool | None = key(
+        "whether these are the bodies of FILE", null="without it", why="no problem was given to compare it with"
+    )
     problem: Problem | None = None
 
     @property
     def summary(self) -> str:
         return f"accepted: {self.words}" if self.accepted else f"refused: {self.why}"
 
-    def content(self) -> dict[str, Any]:
-        reason = {} if self.same is not None else {"same": "no problem was given to compare it with"}
-        names = ("accepted", "why", "words", "sha256", "same")
-        return {**{name: getattr(self, name) for name in names}, "reason": reason}
+
+_rational = partial(Key, type="text", unit="1")
+_rows = partial(Key, type="list of free")
+_multipliers = partial(Key, says="rationals, one for each contact node or one for all of them", type="free")
+
+#: The keys of a claim.
+CLAIM = {
+    "theta": _rational(says="rational: the relaxation factor"),
+    "factor": _rational(
+        says=r"rational: a Lipschitz constant of $T_\theta$ in the norm (5.21), over all loads and gaps"
+    ),
+    "radius": Key(
+        says="rational: the kernel is the hat of this radius, which the checker decides",
+        type="text",
+        unit="length",
+        absent="without friction, and where the kernel is another one: $k$ varies, or grids that differ meet along a"
+        " line that is not level",
+    ),
+    "bits": Key(says="bits of the balls in which the checker decides", type="integer"),
+    "multipliers.lambda": _multipliers(unit="1"),
+    "multipliers.tau": _multipliers(unit="1"),
+    "multipliers.a": _multipliers(unit="length/stress"),
+    "multipliers.b": _multipliers(unit="stress/length"),
+}
+
+#: The keys of the discrete problem.
+DISCRETE = {
+    "body1": Key(says="the lower body", type="Body in rationals"),
+    "body2": Key(says="the upper body", type="Body in rationals"),
+    "neumann_body": Key(says="which body has the Neumann problem", type="integer"),
+    "friction": _rational(says="rational: k, the largest one where it varies"),
+    "weights": Key(says="$w_j$ at the contact nodes", type="list of text", unit="length"),
+    "kernel": _rows(
+        says="a row for each contact node: S on the normal forces of the Neumann nodes,"
+        " times $k_j/\\max k$ where k varies",
+        unit="1/length",
+        null="without friction",
+    ),
+    "transfer": _rows(
+        says="a row for each contact node: P", unit="1", null="where both grids are one, and P the identity"
+    ),
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Certificate(Document):
-    """A claim about T_theta, the bodies that it is about, and its proof.
-
-    Attributes
-    ----------
-    edition : str
-        Name of the bound that proposed the factor.
-    discrete, claim : dict
-        Bodies, transfer, weights, kernel and friction in rationals, as texts; theta, the factor, the multipliers and
-        the bits of the balls in which they prove it.
-    lower : float or None
-        The largest factor found of a pair of forces, in doubles: no certificate proves less.
-    """
+    """A claim about T_theta, the bodies that it is about, and its proof."""
 
     schema: ClassVar[str] = "ndtheory.certificate/1"
+    kind: ClassVar[str] = "contraction"
 
-    edition: str
-    discrete: dict[str, Any]
-    claim: dict[str, Any]
     problem: Problem
-    lower: float | None = None
+    edition: str = key("which bound proposed the factor: `lmi`, `energy` or `repaired`")
+    claim: dict[str, Any] = key(inside=CLAIM, type="object")
+    lower: float | None = key(
+        "the largest factor found of two forces, in doubles: no certificate proves less",
+        unit="1",
+        null="for another edition than `lmi`",
+        why="not computed for this edition",
+    )
+    discrete: dict[str, Any] = key("bodies and what joins them", inside=DISCRETE, type="object")
+
+    @property
+    @says("hash of `discrete`, written with sorted keys and without blanks")
+    def sha256(self) -> str:
+        return check.digest(self.discrete)
 
     @property
     def units(self) -> dict[str, str]:  # type: ignore[override]
@@ -110,17 +142,6 @@ class Certificate(Document):
     @property
     def summary(self) -> str:
         return f"theta = {float(self.theta):.4g}, factor {float(self.factor):.6g} proved ({self.edition})"
-
-    def content(self) -> dict[str, Any]:
-        return {
-            "kind": "contraction",
-            "edition": self.edition,
-            "sha256": check.digest(self.discrete),
-            "claim": self.claim,
-            "lower": self.lower,
-            "reason": {} if self.lower is not None else {"lower": "not computed for this edition"},
-            "discrete": self.discrete,
-        }
 
 
 def certify(

@@ -2,6 +2,6 @@
 
 from ndtheory.statements import quote
 from verification.ledger.evidence import Evidence
-from verification.ledger.rows import Ledger, Row, verify
+from verification.ledger.rows import Finding, Ledger, verify
 
-__all__ = ["Evidence", "Ledger", "Row", "quote", "verify"]
+__all__ = ["Evidence", "Finding", "Ledger", "quote", "verify"]

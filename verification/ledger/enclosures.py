@@ -35,7 +35,7 @@ from verification.certificate.proved_constants import Between, Proof, entries
 from verification.interface.body import Condensed, material_of
 from verification.ledger.cases import ENCLOSED, three_digits
 from verification.ledger.differences import directions, uniform_piece
-from verification.ledger.evidence import Evidence, Form, source
+from verification.ledger.evidence import Aspect, Evidence, source
 from verification.ledger.inequalities import ENTRIES, SEED, RightSides, terms_of
 from verification.ledger.worst import Trial
 from verification.machine.progress import silent
@@ -297,7 +297,7 @@ JUST_BELOW = Fraction(99, 100)
 Sides = list[tuple[Interval, Interval]]
 
 #: A statement, and what of it is decided.
-Key = tuple[str, Form]
+Key = tuple[str, Aspect]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -505,7 +505,7 @@ def both_sides(d: Any, r: Any, key: Key) -> Sides:
     return [(left.square(), right.square())] if id == "x-ratio" else [(left, right)]
 
 
-def decide(bodies: EnclosedBodies, id: str, of: Form) -> Evidence | None:
+def decide(bodies: EnclosedBodies, id: str, of: Aspect) -> Evidence | None:
     """The evidence of an inequality on some bodies; None where the enclosures overlap."""
     key: Key = (id, of)
     unit = SMALL if key == ("5.30", "printed") else TINY if key in OF_MUCH else OWN

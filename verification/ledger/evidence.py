@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
+from ndtheory.keys import ABSENT, Part, key
 from verification.machine.threads import one_thread
 
 Level = Literal["quick", "full"]
 Method = Literal["symbolic", "dimension", "verified", "discrete", "reading"]
-Form = Literal["printed", "step", "repaired"]
+Aspect = Literal["printed", "step", "repaired"]
 Verdict = Literal["PROVED", "REPAIRED", "REFUTED", "NUMERICAL", "ASSUMED", "INCONCLUSIVE"]
 
 #: Strongest first.
@@ -18,40 +19,28 @@ METHODS: tuple[Method, ...] = ("symbolic", "dimension", "verified", "discrete", 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evidence:
-    """One piece of evidence.
+class Evidence(Part):
+    """One piece of evidence; the method is the kind of arithmetic, and decides how strong it is."""
 
-    Attributes
-    ----------
-    method : {'symbolic', 'dimension', 'verified', 'discrete', 'reading'}
-        Exact arithmetic over all admissible values, or an exact counterexample; units on both sides; both sides on one
-        problem, between proved bounds or rational; floating point on random problems; a definition, a cited result, a
-        proof in words or one case computed exactly.
-    of : {'printed', 'step', 'repaired'}
-        What was checked: the statement as printed, the step by which the paper reaches it, or its repaired form.
-    holds : bool or None
-        None where the check could not decide.
-    text : str
-        What was checked and found.
-    data : mapping
-        What it takes to run it again: an exact counterexample, or seed, cases, worst ratio and where.
-    """
-
-    method: Method
-    of: Form
-    holds: bool | None
-    text: str
-    data: Mapping[str, Any] = field(default_factory=dict)
-
-    def to_dict(self) -> dict[str, Any]:
-        """An entry of ``evidence`` in ``ndtheory.ledger/1``."""
-        return {
-            "method": self.method,
-            "of": self.of,
-            "holds": self.holds,
-            "text": self.text,
-            **({"data": dict(self.data)} if self.data else {}),
-        }
+    method: Method = key(
+        "`symbolic`, exact arithmetic over all admissible values, or an exact counterexample; `dimension`, units on"
+        " both sides; `verified`, both sides between proved bounds, or rational, on one problem, which is in `data`"
+        " with `where` and the bounds `ratio` of left over right (and the `unit` of stress and how many times the"
+        " `friction` of the problem, where these are not its own), or with both `forces` and the largest `difference`"
+        " of both sides; `discrete`, floating point on random problems; `reading`, a definition, a cited result, a"
+        " proof in words or one case computed exactly"
+    )
+    of: Aspect = key("what was checked: `printed`, `step` by which the paper reaches it, or `repaired`")
+    holds: bool | None = key(null="where the check could not decide", why=None)
+    text: str = key("what was checked and found")
+    data: Mapping[str, Any] = key(
+        "the data needed to run it again: a counterexample, or seed, cases, worst ratio and where; of the figures of"
+        " Section 6 `departs`, true if every reading that shows one departs from the text",
+        default_factory=dict,
+        type="free",
+        absent="where nothing is needed",
+        of=lambda data: dict(data) or ABSENT,
+    )
 
 
 class Source(Protocol):

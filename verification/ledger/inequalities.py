@@ -22,7 +22,7 @@ from ndtheory import bounds as formulas
 from ndtheory.continuum.intervals import Interval
 from verification.constants import Measured
 from verification.ledger.differences import Difference
-from verification.ledger.evidence import Form
+from verification.ledger.evidence import Aspect
 
 SEED = 2008
 
@@ -244,7 +244,7 @@ class Inequality:
     """
 
     id: str
-    of: Form = "printed"
+    of: Aspect = "printed"
     left: Side
     right: Side
     equality: bool = False
@@ -468,4 +468,4 @@ INEQUALITIES: tuple[Inequality, ...] = (
 )
 
 #: The inequalities by statement and form.
-ENTRIES: Mapping[tuple[str, Form], Inequality] = {(each.id, each.of): each for each in INEQUALITIES}
+ENTRIES: Mapping[tuple[str, Aspect], Inequality] = {(each.id, each.of): each for each in INEQUALITIES}

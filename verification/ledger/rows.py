@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
+from ndtheory.keys import Part, key, says
 from ndtheory.statements import Statement, recorded, statements
 from verification.document import Document
 from verification.ledger.evidence import METHODS, Evidence, Level, Method, Verdict, settle
@@ -16,64 +17,30 @@ NO_GROUND = ("REFUTED", "INCONCLUSIVE")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
-    """A statement with its evidence, strongest first, and its verdict.
+class Finding(Part):
+    """A statement with its evidence and its verdict."""
 
-    Attributes
-    ----------
-    method : str or None
-        The kind of evidence that decided.
-    recorded : str or None
-        The recorded verdict; None where none is recorded.
-    """
-
-    statement: Statement
-    evidence: tuple[Evidence, ...]
-    verdict: Verdict
-    method: Method | None
-    recorded: str | None
+    statement: Statement = key(spread=True)
+    verdict: Verdict = key("the verdict; {doc}`generated/ledger` says what each means")
+    recorded: str | None = key("the recorded verdict", null="where none is", why=None)
+    method: Method | None = key("which kind of evidence decided", null="where none did", why=None)
+    evidence: tuple[Evidence, ...] = key("strongest first")
 
     @property
     def changed(self) -> bool:
         """True if the verdict differs from the recorded one."""
         return self.verdict != self.recorded
 
-    def to_dict(self) -> dict[str, Any]:
-        """An entry of ``statements`` in ``ndtheory.ledger/1``."""
-        s = self.statement
-        faulty = {"fault": s.fault, "wrong": s.wrong, "repair": s.repair, "proof": s.proof} if s.fault else {}
-        return {
-            "id": s.id,
-            "label": s.label,
-            "kind": s.kind,
-            "title": s.title,
-            "claims": s.claims,
-            "verdict": self.verdict,
-            "recorded": self.recorded,
-            "method": self.method,
-            "leans_on": list(s.leans_on),
-            **faulty,
-            "evidence": [e.to_dict() for e in self.evidence],
-            "note": s.note,
-        }
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Ledger(Document):
-    """Rows in the order of the paper.
-
-    Attributes
-    ----------
-    rows : tuple of Row
-    level : {'quick', 'full'}
-        How many problems the discrete evidence took.
-    """
+    """Findings in the order of the paper."""
 
     schema: ClassVar[str] = "ndtheory.ledger/1"
 
-    rows: tuple[Row, ...]
-    level: Level
     units: Mapping[str, str]
+    level: Level = key("`quick` or `full`: how many problems were drawn")
+    rows: tuple[Finding, ...] = key("in the order of the paper", name="statements")
 
     @property
     def whole(self) -> bool:
@@ -81,21 +48,19 @@ class Ledger(Document):
         return len(self.rows) == len(statements())
 
     @property
-    def changed(self) -> tuple[Row, ...]:
+    def changed(self) -> tuple[Finding, ...]:
         """The rows whose verdict differs from the recorded one."""
         return tuple(row for row in self.rows if row.changed)
 
     @property
     def summary(self) -> str:
-        return ", ".join(f"{count} {verdict}" for verdict, count in self.counts().items())
+        return ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items())
 
+    @property
+    @says("how many statements have each verdict", unit="1")
     def counts(self) -> dict[str, int]:
-        """The number of rows with each verdict."""
         verdicts = [row.verdict for row in self.rows]
         return {verdict: verdicts.count(verdict) for verdict in dict.fromkeys(verdicts)}
-
-    def content(self) -> dict[str, Any]:
-        return {"level": self.level, "counts": self.counts(), "statements": [row.to_dict() for row in self.rows]}
 
 
 def verify(
@@ -151,7 +116,9 @@ def verify(
         seen = [replace(e, of="repaired") if own and e.holds else e for e in evidence[s.id]]
         entries = _by_strength([*seen, *_read(s, seen)])
         verdict, method = settle(entries)
-        rows.append(Row(statement=s, evidence=entries, verdict=verdict, method=method, recorded=recorded().get(s.id)))
+        rows.append(
+            Finding(statement=s, evidence=entries, verdict=verdict, method=method, recorded=recorded().get(s.id))
+        )
     return Ledger(rows=tuple(_grounded(rows)), level=level, units={"length": "any", "stress": "any"})
 
 
@@ -173,7 +140,7 @@ def _by_strength(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
     return tuple(sorted(evidence, key=lambda e: METHODS.index(e.method)))
 
 
-def _grounded(rows: Sequence[Row]) -> list[Row]:
+def _grounded(rows: Sequence[Finding]) -> list[Finding]:
     """Nothing is proved from a statement that is refuted or undecided (as recorded, where it was not checked now)."""
     result = {row.statement.id: row for row in rows}
     verdicts: dict[str, str] = recorded() | {id: row.verdict for id, row in result.items()}

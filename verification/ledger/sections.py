@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from ndtheory.statements import symbols
 from verification import registry
-from verification.ledger.rows import Ledger, Row
+from verification.ledger.rows import Finding, Ledger
 from verification.ledger.sheets import FAULTS, WORDS, outcome
 from verification.show.numbers import count
 from verification.show.parts import Facts, Note, Section, Sections, closing, section, table
@@ -25,7 +25,7 @@ def sections(found: Ledger) -> Sections:
 def _summary(found: Ledger) -> Sections:
     about = "Bayada, Sabil, Sassi (2008)"
     own = sum(row.statement.kind == "own" for row in found.rows)
-    verdicts = [(verdict, count(rows), WORDS[verdict]) for verdict, rows in found.counts().items()]
+    verdicts = [(verdict, count(rows), WORDS[verdict]) for verdict, rows in found.counts.items()]
     faults = {
         name.lower(): [row.statement.id for row in found.rows if row.statement.fault == fault]
         for fault, name in FAULTS.items()
@@ -50,13 +50,13 @@ def _rows(found: Ledger) -> Sections:
     return (*map(_row, found.rows), closing("", DEFINED, then=" ".join(["ndtheory verify", *grounds[:4]])))
 
 
-def _row(row: Row) -> Section:
+def _row(row: Finding) -> Section:
     s = row.statement
     changed = f" (recorded: {row.recorded or '-'})" if row.changed else ""
     return section(s.id, f"{s.id}  {plain(s.title)}: {row.verdict}{changed}", *_said(row))
 
 
-def _said(row: Row) -> Iterator[Note | str]:
+def _said(row: Finding) -> Iterator[Note | str]:
     s = row.statement
     yield plain(s.claims)
     if meanings := symbols(s):

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 
 from verification.ledger.evidence import Evidence, Method
-from verification.ledger.rows import Ledger, Row
+from verification.ledger.rows import Finding, Ledger
 
 #: By this our files are known (:mod:`verification.output.files`).
 MARK = "<!-- ndtheory verify -->"
@@ -92,7 +92,7 @@ def page(ledger: Ledger) -> str:
         "",
         "| verdict | rows | means |",
         "|---|---|---|",
-        *(f"| {verdict} | {count} | {WORDS[verdict]} |" for verdict, count in ledger.counts().items()),
+        *(f"| {verdict} | {count} | {WORDS[verdict]} |" for verdict, count in ledger.counts.items()),
         "",
     ]
     lines += ["| kind of evidence | level | is |", "|---|---|---|"]
@@ -109,7 +109,7 @@ def page(ledger: Ledger) -> str:
     return "\n".join([*lines, MARK])
 
 
-def _entry(row: Row) -> Iterable[str]:
+def _entry(row: Finding) -> Iterable[str]:
     s = row.statement
     label = "" if s.kind == "own" else f"{s.label} "
     yield f"### {label}{s.title}: {row.verdict}"

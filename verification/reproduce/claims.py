@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ndtheory.keys import Part, key, says
 from verification.interface.fields import ContactFields
 
 Verdict = Literal["reproduced", "reproduced under an assumption", "undecided", "not reproduced"]
@@ -91,27 +92,41 @@ OPTIMUM = Claim(
 )
 
 
+#: What the steps at the printed theta share.
+IF_CONVERGED: dict[str, Any] = {"unit": "1", "null": "where it does not converge", "why": None}
+
+
 @dataclass(frozen=True, kw_only=True)
-class Curve:
+class Curve(Part):
     """Steps over theta by the increment test, and by the unrelaxed residual; None where it was not met.
 
     If only some theta were run, all of them may need fewer steps than ``fewest``, and each cost is a lower bound.
     """
 
-    label: str
+    label: str = key("what the curve varies")
     steps: Mapping[float, int | None]
     unrelaxed: Mapping[float, int | None]
-    rho: float | None
+    rho: float | None = key(r"$\rho$", unit="1", type="number")
 
     @property
+    @says("by the increment test", unit="1", name="fewest_steps", null="where no theta converges", why=None)
     def fewest(self) -> int | None:
-        """The fewest steps; None if no theta arrives."""
         return min((n for n in self.steps.values() if n is not None), default=None)
 
     @property
+    @says("the thetas of fewest steps", unit="1", name="best_theta", type="free")
     def best(self) -> tuple[float, ...]:
-        """The thetas that take the fewest steps."""
         return tuple(theta for theta, n in self.steps.items() if n is not None and n == self.fewest)
+
+    @property
+    @says(r"steps at $\theta = 0.6$ by the increment test", **IF_CONVERGED)
+    def steps_at_printed(self) -> int | None:
+        return self.steps.get(PRINTED_THETA)
+
+    @property
+    @says("the same by the unrelaxed residual", **IF_CONVERGED)
+    def unrelaxed_at_printed(self) -> int | None:
+        return self.unrelaxed.get(PRINTED_THETA)
 
     def cost_at(self, theta: float) -> float:
         """Steps at a theta over the fewest; inf where it does not arrive."""
@@ -122,14 +137,6 @@ class Curve:
     def cost(self) -> float:
         """The cost of the printed theta."""
         return self.cost_at(PRINTED_THETA)
-
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``curves``."""
-        at = {
-            "steps_at_printed": self.steps.get(PRINTED_THETA),
-            "unrelaxed_at_printed": self.unrelaxed.get(PRINTED_THETA),
-        }
-        return {"label": self.label, "best_theta": list(self.best), "fewest_steps": self.fewest, **at, "rho": self.rho}
 
 
 def curves_hold(name: str, curves: Sequence[Curve]) -> bool:

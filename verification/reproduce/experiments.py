@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from ndtheory.keys import Key, Part, key, says
 from verification.algorithm.monolithic import SolveError, solve
 from verification.document import Document
 from verification.interface.fields import ContactFields
@@ -38,55 +39,67 @@ FIGURES = tuple(CLAIMS)
 THETAS = tuple(f"{n / 20:.2f}" for n in range(1, 20))
 
 
+#: The keys of a zone.
+ZONE = {
+    "state": Key(says="`stick`, `slip` or `open`", type="text"),
+    "from": Key(says=r"from the left end of $\Gamma_c$", unit="length", type="number"),
+    "to": Key(says=r"from the left end of $\Gamma_c$", unit="length", type="number"),
+}
+
+
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """One figure in one reading: contact for Figure 5, curves for the others.
+class Outcome(Part):
+    """One figure in one reading: contact for Figure 5, curves for the others."""
 
-    Attributes
-    ----------
-    holds : bool or None
-        None where the reading is refused, or its runs do not decide; ``reason`` says why.
-    closeness : float
-        For comparing readings: the share of Gamma_c in the printed state, or the fewest steps over the steps at 0.6 on
-        the worst curve; 1 at best.
-    """
-
-    reading: ModelReading
-    holds: bool | None
-    closeness: float = 0.0
-    contact: ContactFields | None = None
-    curves: tuple[Curve, ...] = ()
-    reason: str = ""
+    reading: ModelReading = key("which one")
+    holds: bool | None = key(
+        "whether the reading reproduces the figure", null="where it is refused or undecided", why=None
+    )
+    closeness: float = key(
+        r"how near it comes: the share of $\Gamma_c$ in the printed state, or the fewest steps over those at 0.6 on the"
+        " worst curve",
+        unit="1",
+        default=0.0,
+    )
+    contact: ContactFields | None = key(
+        r"states along $\Gamma_c$ in order",
+        name="zones",
+        default=None,
+        type="list of object",
+        null="except for `fig5`",
+        why=None,
+        of=lambda contact: [{"state": state, "from": low, "to": high} for state, low, high in zones(contact)],
+        inside=ZONE,
+    )
+    curves: tuple[Curve, ...] = key("the curves of a figure; empty for `fig5`", default=())
+    reason: str = key("why the reading is refused or undecided; empty elsewhere", default="")
 
     @property
     def refused(self) -> bool:
         """True if nothing of it was computed."""
         return self.holds is None and not self.curves
 
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``readings``."""
-        shown: dict[str, Any] = {
-            "reading": self.reading.to_dict(),
-            "holds": self.holds,
-            "closeness": self.closeness,
-            "curves": [curve.to_dict() for curve in self.curves],
-            "zones": None,
-            "reason": self.reason,
-        }
-        if self.contact is not None:
-            shown["zones"] = [{"state": s, "from": low, "to": high} for s, low, high in zones(self.contact)]
-        return shown
-
 
 @dataclass(frozen=True, kw_only=True)
-class Result:
+class Result(Part):
     """A figure of the paper in all readings; ``rows`` are the runs behind it, with the name of the reading."""
 
-    figure: str
-    outcomes: tuple[Outcome, ...]
+    figure: str = key("`fig5`, `fig10`, `fig11` or `fig12`")
+    outcomes: tuple[Outcome, ...] = key("one for each reading", name="readings")
     rows: tuple[dict[str, Any], ...] = field(default=(), repr=False)
 
     @property
+    @says("the claim of the paper about it", name="says")
+    def claim(self) -> str:
+        return CLAIMS[self.figure].says
+
+    @property
+    @says("when a reading reproduces it")
+    def criterion(self) -> str:
+        return CLAIMS[self.figure].criterion
+
+    @property
+    @says("`reproduced`, `reproduced under an assumption`, `undecided` or `not reproduced`")
     def verdict(self) -> Verdict:
         """Reproduced if all readings of the text show it, under an assumption if any reading does."""
         seen = [o for o in self.outcomes if not o.refused]
@@ -98,21 +111,10 @@ class Result:
         return "undecided" if any(o.holds is None for o in seen) else "not reproduced"
 
     @property
+    @says("the name of the reading that comes nearest", type="text", of=lambda outcome: outcome.reading.name)
     def closest(self) -> Outcome:
         """The reading that comes nearest; among equals the one that departs least from the text, and the first."""
         return max(self.outcomes, key=lambda o: (bool(o.holds), o.closeness, -len(o.reading.departs)))
-
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``figures``."""
-        claim = CLAIMS[self.figure]
-        return {
-            "figure": self.figure,
-            "says": claim.says,
-            "criterion": claim.criterion,
-            "verdict": self.verdict,
-            "closest": self.closest.reading.name,
-            "readings": [outcome.to_dict() for outcome in self.outcomes],
-        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -122,15 +124,16 @@ class Reproduction(Document):
     schema: ClassVar[str] = "ndtheory.reproduce/1"
     units: ClassVar[Mapping[str, str]] = {"length": "mm", "stress": "MPa"}  # type: ignore[misc]
 
-    results: tuple[Result, ...]
+    results: tuple[Result, ...] = key("one for each figure", name="figures")
 
     @property
     def summary(self) -> str:
         return "; ".join(f"{result.figure}: {result.verdict}" for result in self.results)
 
     @property
+    @says("the reading that comes nearest to all figures together", name="closest.reading")
     def closest(self) -> ModelReading:
-        """The reading that comes nearest to all figures together: most reproduced, then nearest in the mean."""
+        """Most figures reproduced, then nearest in the mean."""
         score = lambda reading: (
             self.reproduced(reading),
             sum(o.closeness for o in self._of(reading)),
@@ -138,18 +141,17 @@ class Reproduction(Document):
         )
         return max((outcome.reading for outcome in self.results[0].outcomes), key=score)
 
+    @property
+    @says("how many figures it reproduces", unit="1", name="closest.reproduced")
+    def reproduced_closest(self) -> int:
+        return self.reproduced(self.closest)
+
     def reproduced(self, reading: ModelReading) -> int:
         """The number of figures that a reading reproduces."""
         return sum(bool(outcome.holds) for outcome in self._of(reading))
 
     def _of(self, reading: ModelReading) -> list[Outcome]:
         return [o for result in self.results for o in result.outcomes if o.reading == reading]
-
-    def content(self) -> dict[str, Any]:
-        return {
-            "figures": [result.to_dict() for result in self.results],
-            "closest": {"reading": self.closest.to_dict(), "reproduced": self.reproduced(self.closest)},
-        }
 
 
 def reproduce(

@@ -13,8 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
+from ndtheory.keys import Part, key, says
 from verification.problem import Problem
 from verification.problem.examples import example
 
@@ -37,29 +38,28 @@ LENGTH, DOWN = Fraction(6, 5), Fraction(-15, 1000)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelReading:
-    """One way to read Section 6: a key of POSITIONS, of MOVED and of MODULI, and one of TOPS.
+class ModelReading(Part):
+    """One way to read Section 6: a key of POSITIONS, of MOVED and of MODULI, and one of TOPS."""
 
-    ``neumann_body`` is 1, the lower body, as in Section 6, or 2 as in Section 3.
-    """
+    part: ClassVar[str] = "Reading"
 
-    position: str
-    moved: str
-    top: str
-    neumann_body: Literal[1, 2]
-    moduli: str
+    position: str = key("where the upper body sits, or `half model`")
+    moved: str = key("which part of its top is moved")
+    top: str = key("whether that may slide")
+    neumann_body: Literal[1, 2] = key("1 as in Section 6, 2 as in Section 3", type="integer")
+    moduli: str = key("`as printed`, or `exchanged`: the upper body has the larger one")
 
     @property
+    @says("in a few words")
     def name(self) -> str:
-        """In a few words."""
         moved = self.moved if self.moved == "whole top" else f"{self.moved} of the top"
         role = f"Neumann body {'lower' if self.neumann_body == 1 else 'upper'}"
         exchanged = "" if self.moduli == "as printed" else ", moduli exchanged"
         return f"{self.position}, {moved} {self.top}, {role}{exchanged}"
 
     @property
+    @says("where it contradicts the text")
     def departs(self) -> list[str]:
-        """Its departures from the text of Section 6; empty if it only fills gaps in the text."""
         departures = {
             "the left sides of both bodies lie on an axis of symmetry": self.position == HALF,
             f"only the {self.moved} of the top is moved": self.moved != "whole top",
@@ -69,8 +69,8 @@ class ModelReading:
         return [text for text, departs in departures.items() if departs]
 
     @property
+    @says("what it assumes where the text is silent")
     def assumes(self) -> list[str]:
-        """Its assumptions where the text is silent."""
         positions = {"centred": ["the upper body is centred"], HALF: []}
         return [*positions.get(self.position, [self.position]), f"top {self.top}"]
 
@@ -95,10 +95,6 @@ class ModelReading:
         base["body1"]["young"], base["body2"]["young"] = MODULI[self.moduli]
         base["iteration"]["neumann_body"] = self.neumann_body
         return Problem.from_dict(base)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``reading`` of a document."""
-        return {**vars(self), "name": self.name, "departs": self.departs, "assumes": self.assumes}
 
 
 #: Every combination; nothing was left out after a run.

@@ -74,7 +74,7 @@ def test_the_summary_is_one_screen_that_counts_every_row(call, kept, whole):
         "WHAT IS WRONG IN THE PAPER?",
     ]
     counts = {line.split()[0]: int(line.split()[1]) for line in lines if line[2:].split(" ")[0] in VERDICTS}
-    assert counts == whole.ledger.counts()
+    assert counts == whole.ledger.counts
     assert sum(counts.values()) == len(STATEMENTS)
 
 
