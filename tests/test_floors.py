@@ -67,7 +67,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "runs over grids": {
         "verification.sweeps": (
-            "__init__ best_theta cluster course export grid identity region row sections store sweep workers"
+            "__init__ best_theta cluster course export grid region row sections store sweep workers"
         )
     },
     "couplings": {

@@ -16,7 +16,7 @@ from verification.algorithm.runs import Run, check_memory, run
 from verification.algorithm.theta import Choice, begin
 from verification.bounds.bound import NOT_ASKED, BoundResult, Subject
 from verification.bounds.losses import Losses
-from verification.bounds.table import chosen, named
+from verification.bounds.table import chosen
 from verification.bounds.verdicts import Judgement, judge_bound, judge_forecast
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
@@ -116,7 +116,9 @@ class Comparison(Document):
             listener.programs(programs)
 
     def _asked(self, *, calculated: bool) -> list[BoundResult]:
-        return [result for name, result in self.bounds.items() if named(name).calculated == calculated and result.asked]
+        return [
+            result for name, result in self.bounds.items() if BOUNDS[name].calculated == calculated and result.asked
+        ]
 
     @property
     def computed(self) -> list[BoundResult]:
@@ -127,7 +129,7 @@ class Comparison(Document):
     def proved_violated(self) -> bool:
         """True if a proved claim was violated: a bug, or an error in a proof.  A violated printed one is a finding."""
         violated = {name for name, judgement in self.verdicts.items() if judgement.verdict == "VIOLATED"}
-        return any(not named(name).finding for name in violated & set(self.bounds))
+        return any(not BOUNDS[name].finding for name in violated & set(self.bounds))
 
     @property
     def inconclusive(self) -> bool:
@@ -135,7 +137,7 @@ class Comparison(Document):
         return any(judgement.verdict == "INCONCLUSIVE" for judgement in self.verdicts.values())
 
     def content(self) -> dict[str, Any]:
-        editions = {name: result.to_dict() for name, result in self.bounds.items() if not named(name).apart}
+        editions = {name: result.to_dict() for name, result in self.bounds.items() if not BOUNDS[name].apart}
         return {
             "title": self.run.pair.title,
             "constants": self.measured.content(),
@@ -157,7 +159,7 @@ class Comparison(Document):
 
     def _objects(self) -> dict[str, Any]:
         """Return objects of single bounds, which are beside ``bounds``."""
-        own = [named(name).objects(result, self.measured) for name, result in self.bounds.items()]
+        own = [BOUNDS[name].objects(result, self.measured) for name, result in self.bounds.items()]
         return {key: value for objects in own for key, value in objects.items()}
 
 

@@ -27,7 +27,6 @@ from verification.algorithm.runs import Run, check_memory, run_from
 from verification.algorithm.start import LEAST, Start, begin_at, tied_size
 from verification.algorithm.theta import choose
 from verification.bounds.bound import BoundResult, Subject
-from verification.bounds.table import named
 from verification.bounds.verdicts import Judgement, judge_bound
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
@@ -242,7 +241,7 @@ class History(Document):
     def proved_violated(self) -> bool:
         """True if an increment violates a proved bound: a bug, or an error in a proof."""
         return any(
-            judgement.verdict == "VIOLATED" and not named(name).finding
+            judgement.verdict == "VIOLATED" and not BOUNDS[name].finding
             for each in self.increments
             for name, judgement in each.verdicts.items()
         )
@@ -469,7 +468,7 @@ class _Iteration:
             "" if isinstance(self._rule, Constant) else f"the bounds are about a constant theta, not {self._rule.name}"
         )
         self._outside = "; ".join(filter(None, [*pair.outside, other]))
-        proved = [bound.factor for name, bound in self.bounds.items() if not named(name).finding]
+        proved = [bound.factor for name, bound in self.bounds.items() if not BOUNDS[name].finding]
         below = [factor.value for factor in proved if factor is not None and factor.value < 1]
         self._factor = min(below, default=None)
 

@@ -370,16 +370,3 @@ def _missed(low: Ends | None, middle: Ends | None, high: Ends | None, width: flo
             of_k = off * width / abs(right - left) if left != right else math.inf
             missed = max(missed, min(off / at if at else math.inf, max(off / most_theta, of_k)))
     return missed
-
-
-class Removed(Bound):
-    """A bound that is no longer registered, of which older results may hold something."""
-
-    name = words = "removed"
-    colour = "#555555"
-
-    def __init__(self, name: str) -> None:
-        vars(self).update(name=name, words=f"the bound {name}")
-
-    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
-        return self.absent("it is not registered")

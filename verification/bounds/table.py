@@ -11,7 +11,7 @@ from ndtheory.bounds import Edition
 from ndtheory.constants import relaxation_factor
 from ndtheory.number import Numeric, weakest
 from ndtheory.texts import did_you_mean
-from verification.bounds.bound import Bound, BoundResult, Removed, Subject, Thresholds
+from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds
 from verification.document import Document
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
@@ -140,11 +140,6 @@ def _why_not(
 
 
 BOUNDS.provide(Printed(), Repaired(), Energy())
-
-
-def named(name: str) -> Bound:
-    """The bound of a result, which may have been taken out of :data:`BOUNDS` since the result was made."""
-    return BOUNDS.get(name) or Removed(name)
 
 
 def certifying() -> tuple[str, ...]:

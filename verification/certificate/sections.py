@@ -10,7 +10,6 @@ from typing import Any
 
 from ndtheory.number import directed
 from verification import registry
-from verification.bounds.table import named
 from verification.certificate import check
 from verification.certificate.continuum import ContinuumCertificate
 from verification.certificate.contraction import Certificate, Checked
@@ -40,8 +39,9 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
             "  No proof can give less than the attained factor."
         )
     sets = "" if found.sets == 1 else f"The pieces of T are divided into {found.sets} sets, each with its own form.  "
+    proposed = registry.BOUNDS[found.edition].words
     proof = (
-        f"{sets}Multipliers proposed by {named(found.edition).words}; with them the quadratic form of the proof is"
+        f"{sets}Multipliers proposed by {proposed}; with them the quadratic form of the proof is"
         f" positive definite for the rational data of the problem, in balls of {found.claim['bits']} bits."
     )
     then = following("certify", "-o", "certificate.json", iteration=True)

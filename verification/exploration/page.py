@@ -16,7 +16,6 @@ from ndtheory.energy_norms import one_minus_square, predicted_factor, predicted_
 from verification.algorithm.history import History, march
 from verification.algorithm.runs import run
 from verification.bounds.bound import Region
-from verification.bounds.table import named
 from verification.constants import measure
 from verification.contact import ContactError
 from verification.document import Document
@@ -30,6 +29,7 @@ from verification.problem.specification import Problem
 from verification.problem.specs import PLACES
 from verification.problem.steps import at_rest, moments
 from verification.problem.tables import ProblemError
+from verification.registry import BOUNDS
 
 #: Multiples of the problem's friction that are run; without friction, the frictions themselves.
 SHARES = tuple(Fraction(n, 4) for n in (0, 2, 4, 6, 8))
@@ -132,7 +132,7 @@ class Exploration(Document):
                 drawn(*(getattr(each, name).mesh_body for each in (first, *later))) for name in ("body1", "body2")
             ],
             "roles": [self._role(found) for found in self.films],
-            "bounds": [{"name": name, "colour": named(name).colour} for name in self._bounds],
+            "bounds": [{"name": name, "colour": BOUNDS[name].colour} for name in self._bounds],
             "past": self._past() if self.histories else None,
         }
 

@@ -12,11 +12,10 @@ from matplotlib.ticker import MaxNLocator
 from verification.algorithm.rates import noise
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
-from verification.bounds.table import named
 from verification.comparison import Comparison
 from verification.figures.bodies import draw_bodies
 from verification.figures.style import PRESSURE, legend_beside, mark_unfinished, new_figure, plain, styled
-from verification.registry import draw
+from verification.registry import BOUNDS, draw
 
 
 def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
@@ -36,7 +35,7 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
         for row in bounds:
             if row.factor is not None and shown.any():
                 line = history[shown][0] * row.factor.value**steps
-                bound = named(row.name)
+                bound = BOUNDS[row.name]
                 ax.semilogy(steps, line, linestyle=bound.dashes, color=bound.colour, label=f"{row.name} bound")
         if run.last.scale > 0:
             floor = noise(run.pair, run.last) / run.last.scale

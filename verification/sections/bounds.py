@@ -8,7 +8,7 @@ from ndtheory import Bounds, EnergyBounds
 from ndtheory.statements import quote
 from verification import registry
 from verification.bounds.bound import BoundResult, bounded
-from verification.bounds.table import Calculated, named
+from verification.bounds.table import Calculated
 from verification.show.numbers import LEGEND, NONE, at_least, factor, figures, interval, marked
 from verification.show.parts import (
     Cell,
@@ -52,7 +52,7 @@ def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown | str]:
         ("", "every small", "some", "", "", *("" for _ in at)),
         ("bound", f"theta: {friction}<", f"theta: {friction}<", "theta allowed", "factor", *at),
     )
-    notes = [words for row in results for words in named(row.name).remarks(row, unit)]
+    notes = [words for row in results for words in registry.BOUNDS[row.name].remarks(row, unit)]
     if any(row.friction.on == "multiple" for row in found):
         notes.append("x given: times the friction that was given")
     notes += [LEGEND] * any(row.marked for row in found)

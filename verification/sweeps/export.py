@@ -13,14 +13,11 @@ import numpy as np
 from ndtheory import __version__
 from verification.algorithm.relaxation import Rule
 from verification.extras import require
-from verification.sweeps.row import RESULTS
+from verification.sweeps.row import RESULTS, TEXTS
 from verification.sweeps.sweep import Sweep
 
 if TYPE_CHECKING:
     import xarray
-
-#: Results that are words; the others are numbers, with NaN where a row has none.
-TEXTS = ("outcome", "reason")
 
 #: Full names of the results and the axes.
 NAMES = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -12,7 +11,7 @@ from typing import Any
 
 from ndtheory import HypothesisError
 from ndtheory.energy_norms import one_minus_square
-from ndtheory.texts import clean, printable
+from ndtheory.texts import printable
 from verification.algorithm.monolithic import SolveError
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.theta import Choice, begin
@@ -49,9 +48,6 @@ RESULTS = (
     *("coupled_residual", "energy_factor", "proved_rate", "rho", "reason"),
 )
 
-#: Columns that once had another name: stores made before keep it.
-RENAMED = {"sharp_factor": "energy_factor"}
-
 #: The columns of whole numbers and of texts; the others are numbers.
 WHOLE = ("neumann_body", "refine", "iterations", "iterations_paper", "steps")
 TEXTS = ("law", "rule", "outcome", "reason")
@@ -75,6 +71,11 @@ class RowSetting:
         return None if found is None else (float(found.at_work), float(found.kappa_1), float(found.kappa_2))
 
 
+def problem_of(start: Problem | ContactPair) -> Problem | None:
+    """Return the problem of a sweep; None of a pair from matrices."""
+    return start if isinstance(start, Problem) else start.problem
+
+
 class SharedBodies:
     """The pairs and the constants of a sweep of ``start``, each made once while it is in use.
 
@@ -84,7 +85,7 @@ class SharedBodies:
 
     def __init__(self, start: Problem | ContactPair) -> None:
         self.start = start
-        self.problem = start if isinstance(start, Problem) else start.problem
+        self.problem = problem_of(start)
         self._law: Law | None = None if isinstance(start, Problem) else start.interface.law
         self._base = lru_cache(maxsize=2)(self._condense)
         self._pair = lru_cache(maxsize=1)(self._change)
@@ -157,36 +158,6 @@ class SharedBodies:
         pair = self._pair(refine, changes)
         contact, neumann = replace(pair.contact, body=None), replace(pair.neumann, body=None)
         return measure(replace(pair, contact=contact, neumann=neumann, problem=None))
-
-
-def is_row(found: Any) -> bool:
-    """Return True if a value that was read from JSON has the columns of a row, each of its type and printable."""
-    if not isinstance(found, dict) or found.keys() != {*GIVEN, *RESULTS} or not found["outcome"]:
-        return False
-    return all(value is None or _fits(name, value) for name, value in found.items())
-
-
-def renamed(found: Any) -> Any:
-    """Return a value that was read from JSON; in a row the columns have their present names, in their order.
-
-    >>> renamed({"rho": 2.0, "sharp_factor": None, "reason": "sharp_factor: outside"})
-    {'rho': 2.0, 'energy_factor': None, 'reason': 'energy_factor: outside'}
-    """
-    if not isinstance(found, dict) or not RENAMED.keys() & found.keys():
-        return found
-    row = {RENAMED.get(name, name): value for name, value in found.items()}
-    if isinstance(row.get("reason"), str):
-        for old, new in RENAMED.items():
-            row["reason"] = row["reason"].replace(f"{old}: ", f"{new}: ")
-    return row
-
-
-def _fits(name: str, value: Any) -> bool:
-    if name in TEXTS:
-        return isinstance(value, str) and clean(value)
-    if isinstance(value, bool) or not isinstance(value, int if name in WHOLE else (int, float)):
-        return False
-    return abs(value) <= sys.float_info.max  # not NaN
 
 
 def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: SharedBodies | None = None) -> Row:

@@ -7,7 +7,6 @@ from shlex import quote
 from typing import Any
 
 from verification import registry
-from verification.bounds.table import named
 from verification.problem.specification import Problem
 from verification.show.numbers import NONE, count, figures, near_one
 from verification.show.parts import Cell, Facts, Next, Quantity, Sections, closing, following, section, table
@@ -94,7 +93,7 @@ def plane(found: Plane, target: Path | None = None) -> Sections:
             highest = figures(max(hi for _, hi in region.theta))
             some = region.every if region.some is None else region.some  # where every small theta contracts some do
             rows.append((name, figures(region.every), figures(some), highest))
-            notes += named(name).remarks(None, found.units["stress"])
+            notes += registry.BOUNDS[name].remarks(None, found.units["stress"])
     notes += [f"{name}: {reason}" for name, reason in found.reason.items()]
     lines = table(("bound", "every small theta: k <", "some theta: k <", "theta at most"), rows)
     outcomes = [point.outcome for point in found.points]

@@ -1,32 +1,62 @@
-"""The store of a sweep: rows in an SQLite file, which outlive the process that made them.
+"""The store of a sweep: rows in an SQLite file, which outlive the process and the release that made them.
 
 One process holds the file and is its only writer.  It writes ahead into a log beside the file, one transaction for the
 rows that come together: whatever ends the process, the file holds every transaction that was begun and ended, and none
 in part.  A power cut may cost the last of them, as SQLite does not wait for the disk after each.
+
+The key of a row is its problem, its values, how it is solved, and the number of the numerics.  A row that another
+version of this library has made is the row that this one would make, unless :data:`NUMERICS` was raised in between.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import itertools
 import json
 import sqlite3
+import sys
 import zlib
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, replace
+from fractions import Fraction
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from ndtheory import __version__
 from ndtheory.keys import key, says
+from ndtheory.texts import clean
+from verification.algorithm.relaxation import rule_of
 from verification.document import Document
+from verification.interface.friction import GivenOperator
+from verification.interface.interface import Law
 from verification.interface.pair import UNITS, ContactPair
 from verification.machine.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
+from verification.registry import LAWS, RULES
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.identity import Identity
-from verification.sweeps.row import ERROR, FAILED, Row, is_row, renamed
+from verification.sweeps.row import ERROR, GIVEN, RESULTS, TEXTS, WHOLE, Row, problem_of
+
+#: The solver of step II in a row: the active set, and the model where that does not settle.
+SOLVER = "auto"
+
+#: Raised by every change of a digit of a row, and only by these: 2 since a residual is compared with present forces, 3
+#: since a node that is held tangentially has no friction, and the normal between two lines is the mean of both.
+NUMERICS = 3
+
+#: Settings and arrays (name in the key: attribute) that always enter the key of a pair; a later setting enters where it
+#: differs from its default, a later array where there is one, so that keys stay.
+SETTINGS = ("theta", "relaxation", "tolerance", "max_iterations")
+ARRAYS = {"stiffness": "schur", "load": "load", "known": "known", "free": "free", "motions": "motions"}
+
+#: Why a rule or a law of a user's own has no key.
+NEEDED = "needed a {} of this library, as nothing tells two versions of another one apart; or no store"
+
+#: Bytes of a key: at a million rows two of them agree by chance once in 1e26 stores.
+LENGTH = 16
 
 #: The application id of a store, which distinguishes it from other files of SQLite: "ndth".
 APPLICATION = 0x6E647468
@@ -64,48 +94,147 @@ class StoreError(ProblemError):
     """A store that cannot be opened, read or written."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Known:
-    """The rows that a store has for some keys.
+# --- keys -------------------------------------------------------------------------------------------------------------
 
-    Attributes
-    ----------
-    rows : dict from the number of a key to its row as :func:`written` has it
-    failed : int
-        Number of them without a run.
-    errors : int
-        Number of those that ended in an error.
-    damaged : int
-        Number of rows whose checksum or columns are wrong; they count as missing.
+
+def keys(start: Problem | ContactPair, grid: SweepGrid) -> list[bytes]:
+    """Return the key of each row of a grid, in the order of its rows.
+
+    Numbers count exactly, mesh files and matrices by their content.
+
+    Raises
+    ------
+    ProblemError
+        A user's own relaxation rule or law of friction, of which nothing distinguishes two versions.
+
+    Examples
+    --------
+    >>> bars = Problem.from_dict({"dimension": 1,
+    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
+    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}})
+    >>> of_theta = lambda *theta: keys(bars, SweepGrid.of({"theta": theta}))
+    >>> of_theta("1/3", 0.5)[1] == of_theta("1/2")[0] != of_theta("1/3")[0]
+    True
     """
+    return _keys(_shared(start, NUMERICS), grid, start.source)
 
-    rows: dict[int, bytes] = field(default_factory=dict)
-    failed: int = 0
-    errors: int = 0
-    damaged: int = 0
 
-    def __or__(self, other: Known) -> Known:
-        """Join the rows and add the other numbers."""
-        return Known(
-            rows=self.rows | other.rows,
-            failed=self.failed + other.failed,
-            errors=self.errors + other.errors,
-            damaged=self.damaged + other.damaged,
-        )
+def _keys(shared: Mapping[str, Any], grid: SweepGrid, source: str) -> list[bytes]:
+    axes = [[f"{name}={_text(name, v, source)};".encode() for v in values] for name, values in grid.axes.items()]
+    start, found = hashlib.sha256(json.dumps(shared).encode("ascii")), []
+    for values in itertools.product(*axes):
+        one = start.copy()
+        one.update(b"".join(values))
+        found.append(one.digest()[:LENGTH])
+    return found
+
+
+def _shared(start: Problem | ContactPair, numerics: int) -> dict[str, Any]:
+    """The data that rows of a sweep have in common, as far as a digit of them can depend on it."""
+    of: dict[str, Any] = {"problem": start.digest} if isinstance(start, Problem) else _of_pair(start)
+    return {"numerics": numerics, "solver": SOLVER, "of": json.dumps(of, sort_keys=True)}
+
+
+def _text(name: str, value: Any, source: str) -> str:
+    if name == "rule":
+        rule = rule_of(value)
+        if RULES.get(rule.name) != rule:
+            raise ProblemError(source, "rule", rule.name, NEEDED.format("rule"))
+        return rule.name
+    if isinstance(value, tuple):
+        return ",".join(exactly(v) for v in value)
+    return exactly(value) if isinstance(value, Fraction) else str(value)
+
+
+def exactly(value: Fraction) -> str:
+    """Write a rational as a text, of whatever length.
+
+    >>> exactly(Fraction(1, 10))
+    '1/a'
+    """
+    return f"{value.numerator:x}/{value.denominator:x}"
+
+
+def _of_pair(pair: ContactPair) -> dict[str, Any]:
+    """Describe a pair by its matrices, bit by bit, and by everything else on which a run of it depends."""
+    default, interface = type(pair.settings)(), pair.interface
+    settings = {
+        name: value
+        for name, value in vars(pair.settings).items()
+        if name in SETTINGS or value != getattr(default, name)
+    }
+    arrays: dict[str, Any] = {"gap": interface.gap, "transfer": interface.transfer}
+    arrays |= {name: v for name in ("on_traces", "slipped") if (v := getattr(interface, name)) is not None}
+    for name, side in (("contact", pair.contact), ("neumann", pair.neumann)):
+        arrays |= {f"{name}.{part}": getattr(side, attribute) for part, attribute in ARRAYS.items()}
+        arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}
+    profile = interface.profile
+    varies = (
+        {} if profile is None else {"profile": [[exactly(v) for v in vars(profile)[name]] for name in vars(profile)]}
+    )
+    return varies | {
+        "matrices": {name: None if array is None else _content(array) for name, array in arrays.items()},
+        "upward": [pair.contact.upward, pair.neumann.upward],
+        "dimension": pair.contact.grid.dimension,
+        "law": None if interface.law is None else _law(interface.law, pair.source),
+        "friction": exactly(pair.friction),
+        "neumann_body": pair.neumann_body,
+        "settings": {name: str(value) for name, value in settings.items()},
+        "problem": None if pair.problem is None else pair.problem.digest,
+    }
+
+
+def _content(array: Any) -> str:
+    plain = np.ascontiguousarray(array)
+    return f"{plain.dtype.str} {plain.shape} {hashlib.sha256(plain.tobytes()).hexdigest()}"
+
+
+def _law(law: Law, source: str) -> dict[str, str]:
+    if isinstance(law, GivenOperator):
+        return {"name": law.name, "words": law.words, "outside": law.outside, "matrix": _content(law.matrix)}
+    if type(law) not in LAWS.values():
+        raise ProblemError(source, "law", type(law).__name__, NEEDED.format("law"))
+    default = {name: field.default for name, field in getattr(type(law), "__dataclass_fields__", {}).items()}
+    given = {name: str(value) for name, value in vars(law).items() if value != default.get(name, MISSING)}
+    return {"name": law.name} | given
+
+
+# --- the file ---------------------------------------------------------------------------------------------------------
 
 
 class Store:
-    """Rows by their keys, in a file that only this process holds; it is created if it does not exist.
+    """The rows of a sweep in a file that only this process holds; a context that lets go of it at its end.
+
+    The file is created if it does not exist.  With ``fresh`` all rows count as missing, and are replaced once they are
+    made again; with ``retry`` the rows do that ended in an error.
+
+    Attributes
+    ----------
+    rows : dict
+        The rows that are there, by their places in the grid.
+    damaged : int
+        Number of rows whose checksum or columns are wrong; they count as missing.
+    others : dict
+        The rows of this sweep that were made under other numerics, by the version of this library.
+    kept : int
+        Number of rows that were added.
 
     Raises
     ------
     StoreError
         The file is not a store, is damaged, cannot be written, or another process holds it.
+    ProblemError
+        A law or a rule that no store can distinguish from another one.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.kept = 0
+    def __init__(
+        self, path: Path, start: Problem | ContactPair, grid: SweepGrid, *, fresh: bool = False, retry: bool = False
+    ) -> None:
+        self.path, self.kept, self.damaged = path, 0, 0
+        self.rows: dict[int, Row] = {}
+        self.others: dict[str, int] = {}
+        shared = _shared(start, NUMERICS)
+        self._keys = _keys(shared, grid, start.source)
         if path.exists() and not path.is_file():
             raise StoreError(str(path), "", None, "needed the name of a file for the store (--store)")
         with self._told():
@@ -113,6 +242,10 @@ class Store:
         try:
             with self._told():
                 self._open()
+                self._read(fresh, retry)
+                for numerics in range(1, NUMERICS):
+                    self._count(_keys(shared | {"numerics": numerics}, grid, start.source))
+                self._study = self._begin(shared, problem_of(start))
         except BaseException:
             self._file.close()
             raise
@@ -139,7 +272,7 @@ class Store:
                 run(f"PRAGMA user_version = {FORMAT}")
                 for table in _tables():
                     run(table)
-        run("CREATE TEMP TABLE wanted (number INTEGER PRIMARY KEY, key BLOB NOT NULL)")
+        run("CREATE TEMP TABLE wanted (place INTEGER PRIMARY KEY, key BLOB NOT NULL)")
 
     def _schema(self) -> list[str]:
         """Return the statements that make the tables, views and triggers of the file; an index changes no answer."""
@@ -149,65 +282,50 @@ class Store:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
         """Let go of the file, and leave one plain file that can be read where nothing can be written."""
         with undisturbed():
             with contextlib.suppress(sqlite3.Error):  # a full disk: the log stays beside the file
                 self._file.execute("PRAGMA journal_mode = DELETE")
             self._file.close()
 
-    def known(self, keys: Mapping[int, bytes], again: Callable[[str], bool] = lambda outcome: False) -> Known:
-        """Return the rows of some keys, given by the numbers of the rows.
-
-        Rows whose outcome is one for which ``again`` returns True count as missing.
-        """
-        found: dict[int, bytes] = {}
-        damaged = failed = errors = 0
-        with self._told(), self._wanted(keys):
-            for number, key, outcome, text, crc in self._file.execute(
-                "SELECT number, rows.key, outcome, CAST(row AS BLOB), crc"
+    def _read(self, fresh: bool, retry: bool) -> None:
+        with self._wanted(self._keys):
+            for place, key, outcome, text, crc in self._file.execute(
+                "SELECT place, rows.key, outcome, CAST(row AS BLOB), crc"
                 " FROM temp.wanted JOIN rows ON rows.key = wanted.key"
             ):
-                row = _read(key, outcome, text, crc)
+                row = _row(key, outcome, text, crc)
                 if row is None:
-                    damaged += 1
-                elif not again(outcome):
-                    found[number] = row
-                    failed += outcome in FAILED
-                    errors += outcome == ERROR
-        return Known(rows=found, failed=failed, errors=errors, damaged=damaged)
+                    self.damaged += 1
+                elif not (fresh or (retry and outcome == ERROR)):
+                    self.rows[place] = row
 
-    def count(self, keys: Mapping[int, bytes]) -> dict[str, int]:
+    def _count(self, keys: Sequence[bytes]) -> None:
         """Count the keys that have a row, by the version of this library that made it."""
-        with self._told(), self._wanted(keys):
-            rows = self._file.execute(
+        with self._wanted(keys):
+            for version, count in self._file.execute(
                 "SELECT version, count(*) FROM temp.wanted JOIN rows ON rows.key = wanted.key"
                 " JOIN studies ON studies.id = rows.study GROUP BY version ORDER BY version"
-            )
-            return {str(version): int(count) for version, count in rows}
+            ):
+                self.others[version] = self.others.get(version, 0) + count
 
-    def studies(self) -> dict[str, str]:
-        """Return the studies of this store, with the version of this library that made each."""
-        with self._told():
-            rows = self._file.execute("SELECT identity, version FROM studies ORDER BY version").fetchall()
-        return {str(identity): str(version) for identity, version in rows}
-
-    def begin(self, identity: Identity, problem: Problem | None) -> int:
+    def _begin(self, shared: dict[str, Any], problem: Problem | None) -> int:
         """Return the number of a study, the origin of rows, with the problem as its file has it."""
-        written = None if problem is None else json.dumps(problem.to_dict())
-        with self._told(), self._transaction():
+        study = hashlib.sha256(json.dumps({"made by": __version__} | shared).encode("ascii")).hexdigest()
+        text = None if problem is None else json.dumps(problem.to_dict())
+        with self._transaction():
             self._file.execute(
                 "INSERT OR IGNORE INTO studies (identity, version, problem) VALUES (?, ?, ?)",
-                [study := identity.study(__version__), __version__, written],
+                [study, __version__, text],
             )
-            row = self._file.execute("SELECT id FROM studies WHERE identity = ?", [study]).fetchone()
-        return int(row[0])
+        return int(self._file.execute("SELECT id FROM studies WHERE identity = ?", [study]).fetchone()[0])
 
-    def add(self, study: int, rows: Sequence[tuple[bytes, Row]]) -> None:
-        """Keep rows, all of them or none; a row that is there already is replaced."""
-        values = [(key, study, row["outcome"], text := written(row), _crc(key, text)) for key, row in rows]
+    def add(self, rows: Sequence[tuple[int, Row]]) -> None:
+        """Keep rows by their places in the grid, all of them or none; may raise StoreError."""
+        values = []
+        for place, row in rows:
+            key, text = self._keys[place], json.dumps(row, separators=(",", ":")).encode("ascii")
+            values.append((key, self._study, row["outcome"], text, _crc(key, text)))
         with self._told(), self._transaction():
             self._file.executemany(
                 "INSERT OR REPLACE INTO rows (key, study, outcome, row, crc) VALUES (?, ?, ?, CAST(? AS TEXT), ?)",
@@ -215,12 +333,22 @@ class Store:
             )
         self.kept += len(rows)
 
+    @property
+    def errors(self) -> int:
+        """Number of the rows that ended in an error."""
+        return sum(row["outcome"] == ERROR for row in self.rows.values())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences about rows that are there and not used, or ended in an error."""
+        return notes(self.path, self.others, self.damaged, self.errors)
+
     @contextlib.contextmanager
-    def _wanted(self, keys: Mapping[int, bytes]) -> Iterator[None]:
+    def _wanted(self, keys: Sequence[bytes]) -> Iterator[None]:
         self._file.execute("DELETE FROM temp.wanted")
         self._file.execute("BEGIN")
         try:
-            self._file.executemany("INSERT INTO temp.wanted VALUES (?, ?)", keys.items())
+            self._file.executemany("INSERT INTO temp.wanted VALUES (?, ?)", enumerate(keys))
             yield
         finally:
             self._file.execute("COMMIT")
@@ -258,86 +386,37 @@ def _tables() -> list[str]:
     return [table.strip() for table in TABLES.split(";") if table.strip()]
 
 
-def written(row: Row) -> bytes:
-    """Write a row as text that reads back to the last digit."""
-    return json.dumps(row, separators=(",", ":")).encode("ascii")
-
-
-def _read(key: object, outcome: object, text: object, crc: object) -> bytes | None:
-    """Return the row of a key, its columns with their present names; None if this program did not write it."""
+def _row(key: object, outcome: object, text: object, crc: object) -> Row | None:
+    """Return the row of a key; None if this program did not write it."""
     if not (isinstance(key, bytes) and isinstance(text, bytes) and crc == _crc(key, text)):
         return None
     try:
-        there = json.loads(text)
+        found = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    found = renamed(there)
-    if not is_row(found) or found["outcome"] != outcome:
-        return None
-    return text if found is there else written(found)
+    return found if is_row(found) and found["outcome"] == outcome else None
+
+
+def is_row(found: Any) -> bool:
+    """Return True if a value that was read from JSON has the columns of a row, each of its type and printable."""
+    if not isinstance(found, dict) or found.keys() != {*GIVEN, *RESULTS} or not found["outcome"]:
+        return False
+    return all(value is None or _fits(name, value) for name, value in found.items())
+
+
+def _fits(name: str, value: Any) -> bool:
+    if name in TEXTS:
+        return isinstance(value, str) and clean(value)
+    if isinstance(value, bool) or not isinstance(value, int if name in WHOLE else (int, float)):
+        return False
+    return abs(value) <= sys.float_info.max  # not NaN
 
 
 def _crc(key: bytes, text: bytes) -> int:
     return zlib.crc32(text, zlib.crc32(key))
 
 
-class Kept:
-    """A store for the time of one sweep; a context that lets go of the file at its end.
-
-    With ``fresh`` all rows count as missing, and are replaced once they are made again; with ``retry`` the rows do
-    that ended in an error.  The file is created if it does not exist.
-
-    Raises
-    ------
-    ProblemError
-        A law or a rule that no store can distinguish from another one.
-    StoreError
-    """
-
-    def __init__(
-        self, path: Path, start: Problem | ContactPair, grid: SweepGrid, *, fresh: bool = False, retry: bool = False
-    ) -> None:
-        identity = Identity.read(start)
-        self._keys = identity.keys(grid)
-        self._store = Store(path)
-        try:
-            again = lambda outcome: fresh or (retry and outcome == ERROR)
-            self.known = Known()
-            for form in self._forms(identity):
-                keys = self._keys if form == identity else form.keys(grid)
-                missing = {i: key for i, key in enumerate(keys) if i not in self.known.rows}
-                self.known |= self._store.known(missing, again)
-            #: The rows of this sweep that were made under other numerics, by the version of this library.
-            self.others = Counter[str]()
-            for numerics in range(1, identity.numerics):
-                for form in self._forms(identity.before(numerics)):
-                    self.others.update(self._store.count(dict(enumerate(form.keys(grid)))))
-            self._study = self._store.begin(identity, start if isinstance(start, Problem) else start.problem)
-        except BaseException:
-            self._store.close()
-            raise
-
-    def _forms(self, identity: Identity) -> list[Identity]:
-        """Return the forms of an identity under which the store has rows: the present one, and those of 0.1.0."""
-        studies = self._store.studies()
-        versions = dict.fromkeys(studies.values())
-        forms = [identity, *(identity.before(identity.numerics, version) for version in versions)]
-        return [form for form in forms if any(form.study(version) in studies for version in versions)]
-
-    def __enter__(self) -> Kept:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._store.close()
-
-    def add(self, rows: Sequence[tuple[int, Row]]) -> None:
-        """Keep rows by their places in the grid; may raise StoreError."""
-        self._store.add(self._study, [(self._keys[i], row) for i, row in rows])
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences about rows that are there and not used, or ended in an error."""
-        return notes(self._store.path, self.others, self.known.damaged, self.known.errors)
+# --- what a sweep would make ------------------------------------------------------------------------------------------
 
 
 def notes(path: Path, others: Mapping[str, int], damaged: int, errors: int) -> tuple[str, ...]:
@@ -401,17 +480,10 @@ def plan(
     retry: bool = False,
 ) -> Plan:
     """Count the rows that a sweep would make; nothing is run, no store is made, and a sweep has the same errors."""
-    known, others = Known(), Counter[str]()
-    if store is not None and store.exists():
-        with Kept(store, start, grid, fresh=fresh, retry=retry) as kept:
-            known, others = kept.known, kept.others
-    return Plan(
-        asked=len(grid),
-        stored=len(known.rows),
-        damaged=known.damaged,
-        errors=known.errors,
-        others=others,
-        store=store,
-        units=start.units if start.units else UNITS,
-        problem=start if isinstance(start, Problem) else start.problem,
+    found = Plan(
+        asked=len(grid), stored=0, damaged=0, store=store, units=start.units or UNITS, problem=problem_of(start)
     )
+    if store is None or not store.exists():
+        return found
+    with Store(store, start, grid, fresh=fresh, retry=retry) as kept:
+        return replace(found, stored=len(kept.rows), damaged=kept.damaged, errors=kept.errors, others=kept.others)

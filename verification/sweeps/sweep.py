@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,8 +18,8 @@ from verification.problem.files import load
 from verification.problem.specification import Problem
 from verification.spreadsheet import as_csv
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.row import FAILED, Row
-from verification.sweeps.store import Kept
+from verification.sweeps.row import FAILED, Row, problem_of
+from verification.sweeps.store import Store
 from verification.sweeps.workers import Work, alone, together
 
 if TYPE_CHECKING:
@@ -268,14 +267,14 @@ def sweep_grid(
 ) -> Sweep:
     """Run :func:`sweep` over a grid that is read already; ``work`` makes the rows, as :func:`work_of` returns it."""
     wanted = list(grid.rows())
-    done: dict[int, Row | bytes] = {}
+    done: dict[int, Row] = {}
     with contextlib.ExitStack() as stack:
-        kept = None if store is None else stack.enter_context(Kept(store, start, grid, fresh=fresh, retry=retry))
+        kept = None if store is None else stack.enter_context(Store(store, start, grid, fresh=fresh, retry=retry))
         if kept is not None:
-            done |= kept.known.rows
+            done |= kept.rows
         stored = len(done)
         todo = [(i, values) for i, values in enumerate(wanted) if i not in done]
-        failed = 0 if kept is None else kept.known.failed
+        failed = sum(row["outcome"] in FAILED for row in done.values())
         tally = Tally(asked=len(wanted), stored=stored, failed=failed, progress=progress)
         try:
             tally.tell()
@@ -291,18 +290,13 @@ def sweep_grid(
     axes = tuple(name for axis in grid.axes for name in (("young1", "young2") if axis == "young" else (axis,)))
     places = tuple(sorted(done))
     return Sweep(
-        rows=tuple(_read(done[i]) for i in places),
+        rows=tuple(done[i] for i in places),
         asked=len(wanted),
         axes=axes,
         grid=grid,
         places=places,
         stored=stored,
         notes=() if kept is None else kept.notes,
-        units=start.units if start.units else UNITS,
-        problem=start if isinstance(start, Problem) else start.problem,
+        units=start.units or UNITS,
+        problem=problem_of(start),
     )
-
-
-def _read(row: Row | bytes) -> Row:
-    found: Row = json.loads(row) if isinstance(row, bytes) else row
-    return found

@@ -15,7 +15,7 @@ from verification.problem.specification import Problem
 from verification.problem.specs import ContactSpec, Settings
 from verification.problem.tables import non_negative
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.identity import Identity
+from verification.sweeps.store import keys
 
 NAMES = ("section6", "two-bars", "inside", "signorini")
 GRID = SweepGrid.of({"theta": ["0.3"]})
@@ -64,11 +64,11 @@ def later_table(monkeypatch):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_later_key_with_a_default_changes_no_digest_and_no_key_of_a_row(monkeypatch, name):
-    before, key = vf.example(name).digest, Identity.read(vf.example(name)).keys(GRID)
+    before, key = vf.example(name).digest, keys(vf.example(name), GRID)
     later_contact(monkeypatch)
     problem = vf.Problem.from_dict(vf.example(name).to_dict())
     assert problem.to_dict()["contact"]["adhesion"] == 0
-    assert (problem.digest, Identity.read(problem).keys(GRID)) == (before, key)
+    assert (problem.digest, keys(problem, GRID)) == (before, key)
 
 
 def test_another_value_of_a_later_key_changes_the_digest(monkeypatch):
@@ -131,8 +131,8 @@ class LaterSettings(Settings):
 
 def test_a_later_setting_with_a_default_changes_no_key_of_a_pair():
     pair = vf.build(vf.example("two-bars"))
-    keys = lambda **more: Identity.read(replace(pair, settings=LaterSettings(**vars(pair.settings), **more))).keys(GRID)
-    assert keys() == Identity.read(pair).keys(GRID) != keys(patience=6)
+    later = lambda **more: keys(replace(pair, settings=LaterSettings(**vars(pair.settings), **more)), GRID)
+    assert later() == keys(pair, GRID) != later(patience=6)
 
 
 # --- certificates ---

@@ -16,11 +16,10 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.algorithm.relaxation import Constant
 from verification.interface.friction import Local
-from verification.sweeps import identity, store
 from verification.sweeps import row as row_module
+from verification.sweeps import store
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.identity import Identity
-from verification.sweeps.store import Store, plan
+from verification.sweeps.store import Store, keys, plan
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 
@@ -118,7 +117,7 @@ def test_a_plan_counts_and_makes_neither_rows_nor_a_file(place, made):
 
 
 def key(start, **axes):
-    [one] = Identity.read(start).keys(SweepGrid.of(axes or {"theta": ["0.3"]}))
+    [one] = keys(start, SweepGrid.of(axes or {"theta": ["0.3"]}))
     return one
 
 
@@ -142,7 +141,7 @@ def test_whatever_changes_a_number_changes_the_key():
 
 def test_another_solver_of_step_ii_changes_the_key(monkeypatch):
     before = key(SMALL)
-    monkeypatch.setattr(identity, "SOLVER", "active-set")
+    monkeypatch.setattr(store, "SOLVER", "active-set")
     assert key(SMALL) != before
 
 
@@ -302,20 +301,23 @@ def test_a_folder_that_may_only_be_read_is_told(place, tmp_path):
 
 def test_a_second_sweep_on_the_same_store_is_told_and_changes_nothing(place, monkeypatch):
     monkeypatch.setattr(store, "PATIENCE", 0.1)
-    with Store(place), pytest.raises(store.StoreError, match="another sweep is at work on it"):
+    one = SweepGrid.of({"theta": ["0.3"]})
+    with Store(place, SMALL, one), pytest.raises(store.StoreError, match="another sweep is at work on it"):
         vf.sweep(SMALL, theta=["0.3"], store=place)
     code = f"""
         import sys
         from pathlib import Path
+        import verification as vf
+        from verification.sweeps.grid import SweepGrid
         from verification.sweeps.store import Store
-        with Store(Path({str(place)!r})):
+        with Store(Path({str(place)!r}), vf.example("two-bars"), SweepGrid.of({{}})):
             print("held", flush=True)
             sys.stdin.read()
     """
     with running(code, stdin=-1) as process:
         assert process.stdout.readline() == "held\n"
         with pytest.raises(store.StoreError, match="another sweep is at work on it"):
-            plan(SMALL, SweepGrid.of({"theta": ["0.3"]}), place)
+            plan(SMALL, one, place)
         process.stdin.close()
         process.wait()
     assert vf.sweep(SMALL, theta=["0.3"], store=place).stored == 0
@@ -404,6 +406,48 @@ def test_what_sqlite_repeats_of_a_damaged_store_is_not_shown(place, name):
     with pytest.raises(store.StoreError) as refused:
         vf.sweep(SMALL, theta=["0.3"], store=place)
     assert str(refused.value) == f"{place}: {store.DAMAGED}"
+
+
+# --- releases and numerics ---
+
+TOLD = "{}: {} of these rows are of version {} with other numerics; they are not used, and stay"
+
+
+def test_rows_of_another_version_are_used(place, made, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "__version__", "0.3.0")
+        first = vf.sweep(SMALL, theta=["0.3", "0.7"], store=place)
+    del made[:]
+    found = vf.sweep(SMALL, theta=["0.3", "0.7", "0.8"], store=place)
+    assert [float(values["theta"]) for values in made] == [0.8]
+    assert (found.rows[:2], found.notes) == (first.rows, ())
+    versions = "SELECT version, count(*) FROM rows JOIN studies ON studies.id = study GROUP BY version ORDER BY 1"
+    assert read(place, versions) == [(store.__version__, 1), ("0.3.0", 2)]
+
+
+def test_rows_of_other_numerics_are_told_by_version_and_neither_used_nor_lost(place, made, monkeypatch):
+    for version, theta in (("0.3.0", ["0.3", "0.7"]), ("0.4.0", ["0.8"])):
+        with monkeypatch.context() as patch:
+            patch.setattr(store, "__version__", version)
+            vf.sweep(SMALL, theta=theta, store=place)
+    before = read(place, "SELECT * FROM rows ORDER BY key")
+    del made[:]
+    monkeypatch.setattr(store, "NUMERICS", store.NUMERICS + 2)
+    grid = {"theta": ["0.7", "0.8", "0.9"]}
+    assert plan(SMALL, SweepGrid.of(grid), place).others == {"0.3.0": 1, "0.4.0": 1}
+    found = vf.sweep(SMALL, **grid, store=place)
+    assert (len(made), found.stored) == (3, 0)
+    assert found.notes == (TOLD.format(place, 1, "0.3.0"), TOLD.format(place, 1, "0.4.0"))
+    assert set(before) < set(read(place, "SELECT * FROM rows"))
+    assert vf.sweep(SMALL, **grid, store=place).stored == 3
+
+
+def test_another_number_of_the_numerics_changes_the_key_and_another_version_does_not(monkeypatch):
+    before = key(SMALL)
+    monkeypatch.setattr(store, "__version__", "9.9")
+    assert key(SMALL) == before
+    monkeypatch.setattr(store, "NUMERICS", store.NUMERICS + 1)
+    assert key(SMALL) != before
 
 
 def test_the_store_says_what_its_rows_are_made_from(place):

@@ -1,4 +1,4 @@
-"""Results of a bound that was taken out of the list since, and rows of bounds that draw no conclusion."""
+"""Rows of bounds that draw no conclusion, and bounds that are registered beside ours."""
 
 import pytest
 from problem_list import plates
@@ -53,15 +53,6 @@ def test_a_bound_without_a_conclusion_allows_no_friction(registered):
 def test_the_column_of_theta_does_not_hang_on_the_first_bound(registered):
     registered("silent", BoundResult(name="silent", proved=True, why="it never speaks"), first=True)
     assert "theta = 0.7" in text(compared().sections()).partition("DOES ONE STEP CONTRACT?")[2].partition("WHAT")[0]
-
-
-def test_a_result_outlives_the_registration_of_its_bounds(registered):
-    registered("silent", BoundResult(name="silent", proved=True, why="it never speaks"))
-    found = compared()
-    before = found.to_json(), text(found.sections())
-    del BOUNDS["silent"]
-    assert (found.to_json(), text(found.sections())) == before
-    assert found.plot()
 
 
 def test_a_bound_that_certifies_does_not_become_the_default_by_registration(registered):
