@@ -3,8 +3,8 @@
 Builds the sdist and the wheel, and both once more from the sdist: the bytes must be the same.  Then, for every Python
 of the classifiers and the one after them that lies on this machine, puts the wheel and click into an empty environment
 and runs, in an empty folder, what needs nothing else: the doctests of the package `ndtheory` and the calculator.  With
-the dependencies of the calling environment the wheel also runs README's list of commands, as printed; --whole: its
-slow one, too.
+--commands, as by night, the wheel also runs README's list of commands, as printed, with the dependencies of the calling
+environment.
 
 SOURCE_DATE_EPOCH is the date of all files in both archives, in seconds since 1970; by default that of the last commit.
 """
@@ -42,9 +42,6 @@ assert sum(result.attempted for result in results) > 0
 sys.exit(sum(result.failed for result in results))
 """
 
-
-#: A command of README's list that takes as long as all others, and what is run for it.
-SLOW = {"ndtheory reproduce all": "ndtheory reproduce fig5"}
 
 #: What a command has of the environment, on all systems.
 INHERITED = ("PATH", "HOME", "LANG", "SYSTEMROOT", "USERPROFILE", "TEMP")
@@ -142,7 +139,7 @@ def interpreter(version: str) -> str | None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="where the sdist and the wheel stay")
-    parser.add_argument("--whole", action="store_true", help="run the slow command of README's list, too")
+    parser.add_argument("--commands", action="store_true", help="run README's list of commands, too: minutes")
     given = parser.parse_args()
     keep = given.keep
     versions = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["project"]["classifiers"]))
@@ -167,12 +164,12 @@ def main() -> None:
             run(commands / "python", "-c", DOCTESTS, cwd=empty)
             answers.add(run(commands / "ndtheory", *BOUNDS, cwd=empty))
             print(f"Python {version}: doctests of ndtheory, ndtheory bounds")
-            if python == sys.executable:
+            if given.commands and python == sys.executable:
                 site = run(commands / "python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip()
                 Path(site, "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n", "utf-8")
                 lines = listed((ROOT / "README.md").read_text("utf-8"))
                 for line in lines:
-                    typed(line if given.whole else SLOW.get(line, line), commands, empty)
+                    typed(line, commands, empty)
                 print(f"Python {version}: the {len(lines)} commands of README's list")
         if len(answers) != 1:
             sys.exit(f"the calculator gives {len(answers)} different documents under {', '.join(versions)}")

@@ -143,7 +143,7 @@ def built() -> list[str]:
 
     with tempfile.TemporaryDirectory() as name:
         work = Path(name).resolve()
-        packed = passes("archives", sys.executable, ".ci/packages.py", "--keep", work / "dist")
+        packed = passes("archives", sys.executable, ".ci/packages.py", "--commands", "--keep", work / "dist")
         site = ROOT / "docs" / "_build" / "html"
         if passes("site", "make", "docs") and packed:
             [wheel] = (work / "dist").glob("*.whl")

@@ -1,6 +1,7 @@
 """Which Pythons are promised, tried and run: the same in the classifiers, the workflow, the Makefile and the README."""
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from types import SimpleNamespace
 
 import pytest
 from processes import ended, environment
+from strategies import AT_NIGHT
 
 import ndtheory
 from verification.extras import EXTRAS
@@ -129,6 +131,15 @@ def test_a_lock_is_installed_by_pip_alone_which_knows_the_settings_of_the_machin
     told = subprocess.run(dry, cwd=ROOT, env=environment(), capture_output=True, text=True, check=True).stdout
     [line] = [line for line in told.splitlines() if "install" in line]
     assert re.search(rf"-m pip .*install .*--no-deps .*--requirement {lock} && .* -m pip check$", line)
+
+
+@pytest.mark.skipif(not AT_NIGHT, reason="every command from the wheel, in a minute or two: by night")
+def test_the_wheel_runs_readme_s_list_of_commands_as_printed():
+    of_pip = {name: value for name, value in os.environ.items() if name.startswith("PIP_")}
+    command = [sys.executable, ".ci/packages.py", "--commands"]
+    done = subprocess.run(command, cwd=ROOT, env=environment(**of_pip), capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "commands of README's list" in done.stdout
 
 
 def test_the_least_promised_python_is_the_one_that_is_needed():
