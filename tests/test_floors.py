@@ -40,7 +40,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "results, extras": {"verification": "document extras schemas"},
     "bodies": {
         "verification.interface": (
-            "__init__ assembly body build checks fields files friction interface joining matrices pair several"
+            "__init__ assembly body build checks fields files friction interface join joining matrices pair several"
         ),
         "verification.contact": "__init__ active_set kkt model step system",
     },

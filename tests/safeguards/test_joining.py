@@ -35,7 +35,7 @@ def gap_of(data):
 @pytest.mark.parametrize("gap", ["0", "1/8"])
 def test_flat_bodies_on_grids_that_differ_have_the_gap_of_the_file_wherever_they_lie(level, gap, roles):
     pair = pair_of(blocks(level, contact={"gap": gap}, iteration={"neumann_body": roles}))
-    assert pair.interface.transfer is not None
+    assert not pair.interface.one_grid
     assert pair.interface.contact.n == (9 if roles == 2 else 5)
     assert np.array_equal(pair.interface.gap, np.full(pair.interface.contact.n, float(Fraction(gap))))
     moved, here = (vf.solve(vf.Problem.from_dict(blocks(y, contact={"gap": "1/100"}))) for y in (level, 0))

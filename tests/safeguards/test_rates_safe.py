@@ -1,6 +1,6 @@
 """Rates of made-up series of residuals, and the noise of a pair of numbers: closed forms."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -9,6 +9,7 @@ import pytest
 
 from verification.algorithm.rates import CLEAR_OF_NOISE, Noise, largest_step_ratio, rate_at_the_end, rate_of
 from verification.interface.interface import Interface
+from verification.interface.join import Mortar
 
 
 @pytest.mark.parametrize("share", [0.5, -0.9])
@@ -64,22 +65,15 @@ def test_nothing_counts_before_the_last_change_of_pattern_or_after_a_residual_ne
 class Factor:
     """Carries by a factor."""
 
-    transfer: np.ndarray
-    slipped: np.ndarray | None = None
-    on_traces: None = None
-    moduli = Interface.moduli
-
-    def carry(self, u):
-        return self.transfer @ u
-
-    def carry_back(self, force):
-        return self.transfer.T @ force
+    join: Mortar
+    slipped: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    moduli, carry, carry_back = Interface.moduli, Interface.carry, Interface.carry_back
 
 
 def pair(S_1, S_2, l_1, l_2, transfer):
     """Two bodies with one unknown each, joined by a factor."""
     number = lambda value: np.array([[float(value)]])
-    interface = Factor(transfer=number(transfer))
+    interface = Factor(join=Mortar(nodal=number(transfer)))
     return SimpleNamespace(
         interface=interface,
         contact=SimpleNamespace(schur=number(S_1), load=number(l_1)[0]),

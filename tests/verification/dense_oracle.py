@@ -240,9 +240,7 @@ class DensePair:
     @cached_property
     def P(self) -> np.ndarray:
         """Traces on the Neumann grid to the contact grid; its nodal matrix is held against its definition elsewhere."""
-        transfer = self.pair.interface.transfer
-        nodal = np.eye(len(self.weights)) if transfer is None else transfer
-        return np.kron(np.eye(self.pair.contact.grid.dimension), nodal)
+        return np.kron(np.eye(self.pair.contact.grid.dimension), self.pair.interface.transfer)
 
     @cached_property
     def friction(self) -> float:

@@ -34,9 +34,8 @@ class Noise:
         self._stiffness, self._flexibility = np.abs(pair.contact.schur), np.abs(pair.neumann.inverse)
         self._neumann_stiffness = np.abs(pair.neumann.schur)
         self._load, self._neumann_load = (np.abs(side.load)[:, None] for side in (pair.contact, pair.neumann))
-        if pair.interface.slipped is not None:
-            slipped = np.abs(pair.interface.slipped)  # all tangential components, which come first
-            self._load = self._load + (self._stiffness[:, : len(slipped)] @ slipped)[:, None]
+        slipped = np.abs(pair.interface.slipped)  # all tangential components, which come first
+        self._load = self._load + (self._stiffness[:, : len(slipped)] @ slipped)[:, None]
 
     def of(self, g: Floats, u: Floats) -> Floats:
         """Return the error at each column of g, shape (2 n, m), with its displacement in u."""

@@ -22,7 +22,8 @@ from fem1d2d.proofs.enclosed import UNIT, Enclosed, gamma, nearest
 from fem1d2d.proofs.exact import Shapes
 from verification.interface.body import Body, in_frames, material_of
 from verification.interface.friction import Nonlocal
-from verification.interface.interface import Grid, Interface
+from verification.interface.interface import Grid
+from verification.interface.join import joined
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
@@ -133,7 +134,7 @@ class ExactInterface:
 
     def __init__(self, pair: ContactPair, contact: NDArray[Any], neumann: NDArray[Any]) -> None:
         self.pair = pair
-        one_grid, contact_grid, neumann_grid = pair.interface.transfer is None, pair.contact.grid, pair.neumann.grid
+        one_grid, contact_grid, neumann_grid = pair.interface.one_grid, pair.contact.grid, pair.neumann.grid
         if pair.problem is not None and pair.problem.contact.surface is not None:
             contact, neumann = exact.fractions(contact_grid.x), exact.fractions(neumann_grid.x)
         # one grid has the positions of body 1, as in doubles
@@ -146,7 +147,7 @@ class ExactInterface:
             self.exact_transfer = mortar(contact, x)
             self.other = Grid(x=x, weights=self.exact_transfer.T @ self.grid.weights)
         normals = (exact_normals(grid.normals) for grid in (contact_grid, neumann_grid))
-        self.exact_on_traces = pair.interface.between(self.exact_transfer, *normals)
+        self.join = pair.interface.holding(joined(self.exact_transfer, *normals))
 
     @cached_property
     def weights(self) -> Enclosed:
@@ -166,13 +167,15 @@ class ExactInterface:
     @cached_property
     def transfer_of_traces(self) -> Enclosed | None:
         """P on the components of a trace that Gamma_u leaves free; None where both bodies have the same."""
-        P, d = self.transfer, self.grid.dimension
         if self.pair.same_traces:
             return None
-        if self.exact_on_traces is not None:
-            return Enclosed.rounded(self.exact_on_traces[self.pair.contact.free][:, self.pair.neumann.free])
-        assert P is not None
-        return Enclosed(middle=np.kron(np.eye(d), P.middle), radius=np.kron(np.eye(d), P.radius))
+        P = self.join.carry(np.eye(self.pair.neumann.grid.size, dtype=int))
+        return Enclosed.rounded(P[self.pair.contact.free][:, self.pair.neumann.free])
+
+    @property
+    def mixes(self) -> bool:
+        """True if P does not act alike on both components: a form of normal ones becomes one of all."""
+        return not (self.join.alike or self.pair.same_traces)
 
     @cached_property
     def exact_kernel(self) -> NDArray[Any] | None:
@@ -185,22 +188,14 @@ class ExactInterface:
         """
         law, problem = self.pair.interface.law, self.pair.problem
         assert problem is not None
-        if law is None or self.grid.dimension == 1:
+        if law is None:
             return None
         contact = problem.contact
         if law != LAWS[contact.law].of(contact.radius):
             raise NotExact("the law of friction was given from Python, and not by exact numbers")
         if isinstance(law, Nonlocal):
             law = replace(law, radius=contact.radius)  # type: ignore[arg-type]  # its formula takes any scalar
-        interface = Interface(
-            contact=self.grid,
-            neumann=self.other,
-            gap=self.pair.interface.gap,
-            transfer=self.exact_transfer,
-            profile=self.pair.interface.profile,
-            held=self.pair.interface.held,
-            planes=self.pair.interface.planes,
-        )
+        interface = replace(self.pair.interface, contact=self.grid, neumann=self.other, join=self.join)
         try:
             return np.asarray(interface.operator(law))
         except (TypeError, ValueError) as error:
@@ -219,8 +214,8 @@ class ExactInterface:
 
         Where normals differ, a form of normal components becomes one of all.
         """
-        P = self.transfer if normal and self.exact_on_traces is None else self.transfer_of_traces
-        if normal and P is not None and self.exact_on_traces is not None:
+        P = self.transfer if normal and not self.mixes else self.transfer_of_traces
+        if normal and self.mixes and P is not None:
             P = self.normal_rows(P)
         return form if P is None else P.T.times(form).times(P).symmetric()
 

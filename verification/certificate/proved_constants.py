@@ -206,8 +206,9 @@ class Proof:
         elif not self.pair.contact.loose:
             self._keep("rho_min", inverse(self.largest(neumann, carried)))
         contact = self.felt(self._normal(self.S[self.contact], self.contact), normal=True)
-        turned = self.joint.exact_on_traces is not None and not self.pair.same_traces
-        self._keep("rho_normal", self.largest(contact, neumann if turned else self._normal(neumann, self.neumann)))
+        self._keep(
+            "rho_normal", self.largest(contact, neumann if self.joint.mixes else self._normal(neumann, self.neumann))
+        )
 
     def _count(self, name: Name) -> int:
         """Contact nodes of a body, which are the last of its interface components."""
@@ -273,7 +274,7 @@ class Proof:
         every = np.arange(len(forces.middle))
         normal = forces.block(every[-self._count(name) :], every)
         P = self.joint.transfer_of_traces
-        if name == self.contact and self.joint.exact_on_traces is not None and P is not None:
+        if name == self.contact and self.joint.mixes and P is not None:
             columns = np.arange(P.middle.shape[1])[-self._count(self.neumann) :]
             normal = P.block(every, columns).T.times(forces)
         elif name == self.contact and self.joint.transfer is not None:

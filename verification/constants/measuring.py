@@ -277,14 +277,13 @@ def pencil(pair: ContactPair) -> tuple[Floats, Floats]:
 
 def normal_pencil(pair: ContactPair) -> tuple[Floats, Floats]:
     """The same of the normal components, the tangential ones condensed out: rho_normal is the largest eigenvalue."""
-    grid, transfer, turned = pair.contact.grid, pair.interface.transfer, pair.interface.on_traces
+    grid, join = pair.contact.grid, pair.interface.join
     normal = np.arange(grid.size)[pair.contact.free] >= grid.t
     contact = _condense_tangential(_free(pair.contact), normal, _motions(pair.contact))
-    if turned is not None and transfer is not None:  # a normal force on one grid has a tangential part on the other
-        rows = turned[grid.normal][:, pair.neumann.free]
+    if not (join.one_grid or join.alike):  # a normal force on one grid has a tangential part on the other
+        rows = pair.interface.carry(np.eye(pair.neumann.grid.size))[grid.normal][:, pair.neumann.free]
         return rows.T @ contact @ rows, _free(pair.neumann)
-    if transfer is not None:
-        contact = transfer.T @ contact @ transfer
+    contact = join.values_back(join.values_back(contact).T)
     normal = np.arange(pair.neumann.grid.size)[pair.neumann.free] >= pair.neumann.grid.t
     return contact, _condense_tangential(_free(pair.neumann), normal)
 

@@ -101,7 +101,7 @@ class Pencils:
     """
 
     def __init__(self, bodies: TwoBodies, progress: Progress = silent) -> None:
-        if bodies.interface.transfer is not None:
+        if not bodies.interface.one_grid:
             counts = " and ".join(map(str, bodies.interface.counts.values()))
             needed = (
                 f"needed one grid for both bodies, these have {counts} nodes: between grids that differ rho is found"

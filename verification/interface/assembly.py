@@ -192,13 +192,13 @@ class TwoBodies(Value):
                 return None
             load = _load(problem, body.name, body.mesh, body.nodes, self.interface)
             known = _supports(problem, body.name, body.mesh)
-            planes = self.interface.planes
-            if planes is not None and known.values[body.nodes[planes[body is self.neumann]]].any():
+            if known.values[body.nodes[self.interface.planes[body is self.neumann]]].any():
                 needed = "needed 0 along Gamma_c at its ends that both bodies hold: they are planes of symmetry"
                 raise problem.refuse(f"{body.name}.prescribed", None, needed)
             return body.under(known, load)
 
-        interface = copied(self.interface, slipped=slipped)
+        still = np.zeros(self.interface.contact.t)
+        interface = copied(self.interface, slipped=still if slipped is None else slipped)
         body1, body2 = loaded(self.body1), loaded(self.body2)
         return replace(self, body1=body1, body2=body2, interface=interface, problem=problem)
 
@@ -223,8 +223,7 @@ def reasons_outside(interface: Interface, friction: Fraction, free: Mapping[int,
     reasons = []
     if friction and interface.law is not None and interface.law.outside:
         reasons.append(interface.law.outside)
-    planes = 0 if interface.planes is None else int(interface.planes[0].sum())
-    holds = [body for body, components in free.items() if (~components).sum() > planes]
+    holds = [body for body, components in free.items() if (~components).sum() > interface.planes[0].sum()]
     if holds:
         which = " and ".join(f"body {body}" for body in holds)
         half = "; half of a symmetric model has supports on both bodies there" if len(holds) < len(free) else ""
@@ -252,7 +251,7 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
             f"the initial gap is {interface.gap[j]:.4g} at {interface.contact.place(j)}: the bodies overlap as they"
             " are drawn, and press each other apart before any load acts"
         )
-    if friction and interface.law is not None and interface.contact.dimension == 2:
+    if friction and interface.law is not None:
         found += interface.law.warnings(interface)
     return found
 
@@ -273,7 +272,8 @@ def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True)
             needed = f"needed an elastic body: it has the {role} problem of the iteration"
             raise problem.refuse(f"{name}.shape", "rigid", f"{needed}; `ndtheory solve` takes obstacles")
     bodies = discretise(problem, law=law, dense=dense)
-    if bodies.interface.transfer is not None and bodies.interface.law is not None and bodies.interface.law.of_contact:
+    law = bodies.interface.law
+    if law is not None and law.of_contact and not bodies.interface.one_grid:
         needed = (
             "needed another law on grids that differ: the iteration knows the forces of the Neumann grid, not those of"
             " the contact grid; `ndtheory solve` takes it"

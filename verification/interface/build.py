@@ -141,7 +141,7 @@ def build(
         _condensed(name, matrix, load, own, free, upward=neumann_body == 2)
         for name, matrix, load, own, free in (("contact", S_c, l_c, grid, motions), ("neumann", S_n, l_n, other, None))
     )
-    interface = Interface(contact=grid, neumann=other, gap=distance, law=given, transfer=P)
+    interface = Interface.joining(grid, other, P, gap=distance, law=given)
     pair = ContactPair(contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body)
     return _rubbing(pair, 0 if friction is None else friction)
 

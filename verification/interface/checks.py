@@ -116,7 +116,7 @@ def check_state(
 
 def _of_the_law(bodies: TwoBodies | ContactPair, contact: ContactFields) -> list[str]:
     interface = bodies.interface
-    if interface.law is None or not bodies.friction or interface.contact.dimension == 1:
+    if interface.law is None or not bodies.friction:
         return []
     return interface.law.warnings_after(interface, float(bodies.friction), contact.pressure, contact.bound)
 

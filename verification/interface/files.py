@@ -21,7 +21,7 @@ from ndtheory import HypothesisError, __version__, exact
 from verification.dense import pinned
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.friction import GivenOperator
-from verification.interface.interface import Grid, Interface, held_along
+from verification.interface.interface import NO_SUPPORT, Grid, Interface
 from verification.interface.matrices import (
     ASYMMETRY,
     UNREADABLE,
@@ -71,7 +71,10 @@ def write_interface(pair: ContactPair, path: Path) -> None:
     }
     if interface.kernel is not None and interface.law is not None:
         arrays |= {"kernel": interface.kernel, "law": interface.law.words, "outside": interface.law.outside}
-    arrays |= {name: v for name in ("transfer", "slipped") if (v := getattr(interface, name)) is not None}
+    if not interface.one_grid:
+        arrays["transfer"] = interface.transfer
+    if interface.slipped.any():
+        arrays["slipped"] = interface.slipped
     with path.open("wb") as file:
         np.savez(file, **arrays)
 
@@ -82,7 +85,7 @@ def write_transfer(interface: Interface, path: Path) -> None:
     P leads from nodal values on the Neumann grid to those on the contact grid, its transpose from nodal forces back.
     Where normals differ it acts on vectors, of both components, with normals from body 1 to body 2.
     """
-    P = sp.csr_array(interface.transfer if interface.on_traces is None else interface.on_traces)
+    P = sp.csr_array(interface.transfer if interface.join.alike else interface.carry(np.eye(interface.neumann.size)))
     arrays = {"format": b"csr", "shape": P.shape, "data": P.data, "indices": P.indices, "indptr": P.indptr}
     for name, grid in (("contact", interface.contact), ("neumann", interface.neumann)):
         arrays |= {f"x_{name}": grid.x, f"weights_{name}": grid.weights}
@@ -172,10 +175,10 @@ def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     check_nodes(grid.x, grid.weights)
     if neumann.loose:
         raise ValueError(f"motions{neumann_body}: needed none of the body with the Neumann problem")
-    slipped = real_array("slipped", arrays["slipped"], (grid.t,)) if "slipped" in arrays else None
+    slipped = real_array("slipped", arrays.get("slipped", np.zeros(grid.t)), (grid.t,))
     gap = real_array("gap", arrays["gap"], (n,))
-    held, planes = held_along([contact.support, neumann.support], grid, other) if grid.t else (None, None)
-    interface = Interface.joining(grid, other, transfer, gap=gap, law=law, slipped=slipped, held=held, planes=planes)
+    support = (contact.support, neumann.support) if grid.t else NO_SUPPORT
+    interface = Interface.joining(grid, other, transfer, support, gap=gap, law=law, slipped=slipped)
     if neumann_body == 1:
         interface = interface.reversed()
     pair = ContactPair(

@@ -88,7 +88,7 @@ class Nonlocal(Law):
         share = float(weights @ even / weights.sum())
         if r < width * (1 - 1e-9):
             effect = f"multiplies friction by about width/radius = {width / r:.3g}"
-            if interface.transfer is not None:
+            if not interface.one_grid:
                 effect = f"multiplies the friction bound of a node by {even.min():.2f} to {even.max():.2f}"
             below = f"contact.radius = {r:g} is below the mesh width {width:g}"
             return [f"{below}: the kernel sees single nodes and {effect}"]
@@ -118,14 +118,13 @@ class Local(Law):
         return "local law"
 
     def operator(self, interface: Interface) -> Floats:
-        stress = np.diag(1 / interface.neumann.weights)
-        return stress if interface.transfer is None else interface.transfer @ stress
+        return interface.join.values(np.diag(1 / interface.neumann.weights))
 
     def warnings_after(self, interface: Interface, k: float, pressure: Floats, bound: Floats) -> list[str]:
         coulomb = k * pressure * (1.0 if interface.shares is None else interface.shares)
         pressed = (coulomb > LITTLE * coulomb.max(initial=0.0)) & (bound > 0)  # it is 0 where a support stands in
         ratios = bound[pressed] / coulomb[pressed]
-        if interface.transfer is None or (np.abs(ratios - 1) <= SHARE).all():
+        if interface.one_grid or (np.abs(ratios - 1) <= SHARE).all():
             return []
         return [
             'contact.law = "local" on grids that differ: the friction bound of closed nodes is'

@@ -14,12 +14,19 @@ from numpy.typing import NDArray
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
 from fem1d2d.trace import SAME
+from verification.interface.join import ONE_GRID, Held, Join, joined
 from verification.interface.matrices import real_array
 from verification.problem.specs import Profile
-from verification.value import Value, freeze, lent
+from verification.value import Value, copied, freeze, lent
 
 #: One truth value for each node, or for each component, of a grid.
 Nodes = NDArray[np.bool_]
+
+#: The nodes of a body whose tangential component is held, and those of them that are held at 0; None for a rigid body.
+Support = tuple[Nodes, Nodes] | None
+
+#: What holds bodies whose supports are not known.
+NO_SUPPORT: tuple[Support, Support] = (None, None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -204,21 +211,17 @@ class Interface(Value):
         Initial distance, unit of length.
     law : Law or None
         The law of friction; None where no friction force can act.
-    transfer : array, shape (contact nodes, Neumann nodes), or None
-        P: values on the contact grid of a function given on the Neumann grid.  Only its transpose returns the forces.
-        None where both grids are one: then P is the identity.
+    join : Join
+        P: traces on the contact grid of a function given on the Neumann grid.  Only its transpose returns the forces.
     profile : Profile or None
         How the coefficient of friction varies along Gamma_c; None where it is constant.
-    on_traces : array, shape (contact components, Neumann components), or None
-        P on vectors, where it does not act alike on both components: where the normals of the two grids differ it turns
-        each vector from one node's directions into another's, and what is held tangentially is 0.
-    held : bool array, shape (contact nodes,), or None
+    held : bool array, shape (contact nodes,)
         Contact nodes whose tangential component a support of the contact body holds.  The support carries any shear
         there, so that they have no friction condition, and their tangential unknowns are not in the trace space.
-    planes : pair of bool arrays, shapes (contact nodes,) and (Neumann nodes,), or None
+    planes : pair of bool arrays, shapes (contact nodes,) and (Neumann nodes,)
         The ends of Gamma_c on a plane of symmetry, where supports hold both bodies tangentially at 0.
-    slipped : array, shape (t of the contact grid,), or None
-        ``u1_T - u2_T`` before the load increment, from which friction measures slip, unit of length; None for 0.
+    slipped : array, shape (t of the contact grid,)
+        ``u1_T - u2_T`` before the load increment, from which friction measures slip, unit of length.
     lines : tuple of Stretch
         The lines of more than two bodies, one after the other; empty for two bodies, which have one line.
     """
@@ -226,42 +229,55 @@ class Interface(Value):
     contact: Grid
     neumann: Grid
     gap: Floats
+    join: Join
+    held: Nodes
+    planes: tuple[Nodes, Nodes]
+    slipped: Floats
     law: Law | None = None
-    transfer: Floats | None = None
     profile: Profile | None = None
-    slipped: Floats | None = None
-    on_traces: Floats | None = None
-    held: Nodes | None = None
-    planes: tuple[Nodes, Nodes] | None = None
     lines: tuple[Stretch, ...] = ()
 
     @classmethod
-    def joining(cls, contact: Grid, neumann: Grid, transfer: Floats | None, **rest: Any) -> Interface:
-        """Return an interface with this transfer P between nodal values, each node with the normal of its grid."""
-        found = cls(contact=contact, neumann=neumann, transfer=transfer, **rest)
-        return replace(found, on_traces=found.between(transfer, contact.normals, neumann.normals))
+    def joining(
+        cls,
+        contact: Grid,
+        neumann: Grid,
+        transfer: Floats | None,
+        support: Sequence[Support] = NO_SUPPORT,
+        *,
+        law: Law | None = None,
+        **rest: Any,
+    ) -> Interface:
+        """Return an interface with this P between nodal values, one grid without; nodes have the normals of their grid.
 
-    def between(self, P: NDArray[Any] | None, contact: NDArray[Any] | None, neumann: NDArray[Any] | None) -> Any:
-        """Return P on vectors between nodes with these normals, 0 where a tangential component is held.
-
-        Rational where P is; None where it acts alike on both components.
+        ``support`` is what supports hold of both bodies' contact nodes, the contact body first.
         """
-        turned = turned_transfer(P, contact, neumann)
-        if self.held is None:
-            return turned
-        if turned is None:
-            P = np.eye(self.contact.n) if P is None else P
-            turned = np.block([[P, 0 * P], [0 * P, P]])
-        turned[self.contact.tangential][self.held] = 0
-        if self.planes is not None:
-            turned[:, self.neumann.tangential][:, self.planes[1]] = 0
-        return turned
+        held, planes = held_along(support, contact, neumann)
+        given: dict[str, Any] = {"held": held, "planes": planes, "slipped": np.zeros(contact.t)} | rest
+        law = law if contact.t else None  # bars meet at a point
+        found = cls(contact=contact, neumann=neumann, join=ONE_GRID, law=law, **given)
+        return replace(found, join=found.holding(joined(transfer, contact.normals, neumann.normals)))
+
+    def holding(self, join: Join) -> Join:
+        """Return a join of these grids that leaves out the tangential components that are held."""
+        if not self.held.any():
+            return join
+        kept = (~np.append(nodes, np.zeros(len(nodes), dtype=bool)) for nodes in (self.held, self.planes[1]))
+        return Held(of=join, contact=next(kept), neumann=next(kept))
 
     def reversed(self) -> Interface:
         """Return the interface for vectors with their normal components along the opposite direction."""
-        if self.on_traces is None:
-            return self
-        return replace(self, on_traces=self.contact.turn(self.neumann.turn(self.on_traces.T).T))
+        return copied(self, join=self.join.reversed(self.contact.t, self.neumann.t))
+
+    @property
+    def one_grid(self) -> bool:
+        """True if both bodies have the same contact nodes."""
+        return self.join.one_grid
+
+    @property
+    def transfer(self) -> Floats:
+        """P as a matrix on nodal values, shape (contact nodes, Neumann nodes): the identity on one grid."""
+        return self.join.values(np.eye(self.neumann.n))
 
     @property
     def varies(self) -> bool:
@@ -277,8 +293,7 @@ class Interface(Value):
     @property
     def moduli(self) -> Interface:
         """The interface with the moduli of all entries of P, to bound rounding."""
-        transfer, on_traces = (None if P is None else np.abs(P) for P in (self.transfer, self.on_traces))
-        return replace(self, transfer=transfer, on_traces=on_traces)
+        return replace(self, join=self.join.mapped(np.abs))
 
     @property
     def counts(self) -> dict[str, int]:
@@ -292,8 +307,7 @@ class Interface(Value):
     @property
     def offset(self) -> Floats:
         """The jump of body 1 against body 2 at which nothing has moved: the slip before the increment, and the gap."""
-        slipped = np.zeros(self.contact.t) if self.slipped is None else self.slipped
-        return np.concatenate([slipped, self.gap])
+        return np.concatenate([self.slipped, self.gap])
 
     @lent
     def kernel(self) -> Floats | None:
@@ -303,9 +317,9 @@ class Interface(Value):
         ``w_j max k |(S sigma_N)_j|`` as with a constant one.  ValueError where the grids differ, and the law takes the
         forces of the contact grid.
         """
-        if self.law is None or self.contact.dimension == 1:
+        if self.law is None:
             return None
-        if self.law.of_contact and self.transfer is not None:
+        if self.law.of_contact and not self.one_grid:
             raise ValueError(f"{self.law.words}: no operator on the Neumann grid")
         S = real_array("the operator S", self.operator(self.law), (self.contact.n, self.neumann.n))
         return freeze(S)
@@ -313,18 +327,17 @@ class Interface(Value):
     @property
     def shown(self) -> Interface:
         """The interface that also carries displacements past a held node, which friction there does not feel."""
-        held = None if self.planes is None else self.planes[0]
-        if self.held is None or (held is not None and np.array_equal(held, self.held)):
+        if np.array_equal(self.held, self.planes[0]):
             return self
-        other = replace(self, held=held)
-        return replace(other, on_traces=other.between(self.transfer, self.contact.normals, self.neumann.normals))
+        other = replace(self, held=self.planes[0])
+        return replace(other, join=other.holding(self.join.free))
 
     def reflected(self, x: Floats, reach: float) -> list[Floats]:
         """Return the images of positions in the planes of symmetry that come within a distance of Gamma_c.
 
         Between two planes the images are reflected in turn.
         """
-        at = [] if self.planes is None else list(self.contact.x[self.planes[0]])
+        at = list(self.contact.x[self.planes[0]])
         low, high = self.contact.x[0] - reach, self.contact.x[-1] + reach
         found, last = [], [(x, -1)]
         while last:
@@ -346,10 +359,8 @@ class Interface(Value):
         """Return the operator of a law, each row times the share of its contact node; 0 where no friction can act."""
         shares, S = self.shares, law.operator(self)
         S = S if shares is None else shares[:, None] * S
-        if self.held is None:
-            return S
-        rubs = ~self.held if self.planes is None else ~self.held | self.planes[0]
-        return np.where(rubs[:, None], S, 0)
+        rubs = ~self.held | self.planes[0]
+        return S if rubs.all() else np.where(rubs[:, None], S, 0)
 
     @property
     def contact_kernel(self) -> Floats | None:
@@ -357,11 +368,9 @@ class Interface(Value):
 
         On all its components, where normals differ: tangential forces of one grid have a normal part on the other.
         """
-        if self.transfer is not None and self.law is not None and self.law.of_contact:
+        if self.law is not None and self.law.of_contact:
             return self.operator(self.law)
-        if self.transfer is None or self.kernel is None:
-            return self.kernel  # on one grid P leaves normal components as they are
-        return self.kernel @ (self.transfer if self.on_traces is None else self.on_traces[:, self.neumann.normal]).T
+        return None if self.kernel is None else self.join.felt(self.kernel)
 
     def stress(self, force: Floats) -> Floats:
         """Return ``S sigma_N`` at the contact nodes for a force on the Neumann grid; 0 without a law of friction."""
@@ -370,31 +379,21 @@ class Interface(Value):
 
     def carry(self, traces: Floats) -> Floats:
         """Return ``P u``: traces on the Neumann grid, one or columns of them, on the contact grid."""
-        if self.on_traces is not None:
-            return np.asarray(self.on_traces @ traces)
-        if self.transfer is None:
-            return traces
-        return np.concatenate([self.transfer @ block for block in self.neumann.components(traces)])
+        return self.join.carry(traces)
 
     def carry_back(self, forces: Floats) -> Floats:
         """Return ``P' f``: nodal forces on the contact grid, one or columns of them, on the Neumann grid."""
-        if self.on_traces is not None:
-            return np.asarray(self.on_traces.T @ forces)
-        if self.transfer is None:
-            return forces
-        return np.concatenate([self.transfer.T @ block for block in self.contact.components(forces)])
+        return self.join.carry_back(forces)
 
     def spread(self, forces: Floats) -> Floats:
         """Return the nodal forces on the contact grid that have the stresses of given ones on the Neumann grid."""
-        if self.transfer is None:
-            return self.carry(forces)
         stresses = self.neumann.components(forces) / self.neumann.weights
         carried = self.contact.components(self.carry(stresses.reshape(-1)))
         return np.asarray((self.contact.weights * carried).reshape(-1))
 
     def pressed(self, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return True for the Neumann nodes on which the forces of some contact nodes act."""
-        return touching if self.transfer is None else np.asarray((self.transfer != 0).T @ touching, dtype=bool)
+        return self.join.mapped(np.abs).values_back(touching) > 0
 
     def carry_form(self, form: Floats) -> Floats:
         """Return ``P' X P`` of a symmetric matrix X on the contact grid."""
@@ -415,38 +414,13 @@ class Interface(Value):
 
         ``held`` are the nodes whose tangential component is held for the body that has the contact grid then.
         """
-        if self.transfer is not None:
+        if not self.one_grid:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
-        planes = None if self.planes is None else self.planes[::-1]
-        other = replace(self, contact=self.neumann, neumann=self.contact, planes=planes, on_traces=None)
-        other = replace(other, held=held if held.any() else None)
-        return replace(other, on_traces=other.between(None, None, None))
+        other = replace(self, contact=self.neumann, neumann=self.contact, planes=self.planes[::-1], held=held)
+        return replace(other, join=other.holding(ONE_GRID))
 
 
-def turned_transfer(P: NDArray[Any] | None, contact: NDArray[Any] | None, neumann: NDArray[Any] | None) -> Any:
-    """Return P on vectors, tangential components first, between nodes with these normals; rational where they are.
-
-    None where all normals are the same, or P is the identity: then it acts on each component by itself.
-    """
-    if P is None or contact is None or neumann is None:
-        return None
-    if all((normals == contact[0]).all() for normals in (contact, neumann)):
-        return None
-    tangents = [np.stack([normals[:, 1], -normals[:, 0]], axis=1) for normals in (contact, neumann)]
-    rows, columns = ((t, n) for t, n in zip(tangents, (contact, neumann), strict=True))
-    return np.block([[P * (one @ other.T) for other in columns] for one in rows])
-
-
-#: The nodes of a body whose tangential component is held, and those of them that are held at 0; None for a rigid body.
-Support = tuple[Nodes, Nodes] | None
-
-#: Contact nodes that are held tangentially, and nodes of both grids on planes of symmetry; None where there are none.
-Held = tuple[Nodes | None, tuple[Nodes, Nodes] | None]
-
-
-def held_along(
-    support: Sequence[Support], contact: Grid, neumann: Grid
-) -> tuple[Nodes | None, tuple[Nodes, Nodes] | None]:
+def held_along(support: Sequence[Support], contact: Grid, neumann: Grid) -> tuple[Nodes, tuple[Nodes, Nodes]]:
     """Return the contact nodes that are held tangentially, and the ends of Gamma_c on a plane of symmetry.
 
     There every elastic body is held at 0; a rigid one is its own mirror image.
@@ -456,5 +430,4 @@ def held_along(
         together = abs(contact.x[end] - neumann.x[end]) <= SAME * np.ptp(contact.x)
         if together and any(support) and all(body is None or body[1][end] for body in support):
             planes[0][end] = planes[1][end] = True
-    held = planes[0] if support[0] is None else planes[0] | support[0][0]
-    return held if held.any() else None, planes if planes[0].any() else None
+    return planes[0] if support[0] is None else planes[0] | support[0][0], planes

@@ -10,7 +10,7 @@ import numpy as np
 from fem1d2d import Line, Mesh, MeshError, Supports, facing, mortar, surface, trapezoid
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
-from verification.interface.interface import Grid, Interface, Law, Support, held_along
+from verification.interface.interface import Grid, Interface, Law, Support
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
 from verification.registry import LAWS
@@ -66,11 +66,8 @@ def join(
     nodes, grids, P, gap = (_along_x if problem.contact.surface is None else _along_lines)(problem, meshes, known)
     contact, neumann = grids if problem.contact_body == 1 else grids[::-1]
     law = law or LAWS[problem.contact.law].of(problem.contact.radius)
-    support = _supported(known, nodes) if problem.dimension == 2 else [None, None]
-    held, planes = held_along(support if problem.contact_body == 1 else support[::-1], contact, neumann)
-    interface = Interface.joining(
-        contact, neumann, P, gap=gap, law=law, profile=problem.contact.profile, held=held, planes=planes
-    )
+    support = _supported(known, nodes)[:: 1 if problem.contact_body == 1 else -1]
+    interface = Interface.joining(contact, neumann, P, support, gap=gap, law=law, profile=problem.contact.profile)
     check_profile(problem, interface)
     if P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
         needed = "needed a larger one: it reaches no node of the Neumann grid from any contact node, so that S is 0"

@@ -193,7 +193,7 @@ class ContactPair(Value):
         bodies = self.on_meshes().under(problem, slipped)
         lower, upper = (side.under(body) for side, body in zip((self.body1, self.body2), bodies.elastic, strict=True))
         contact, neumann = (lower, upper) if self.neumann_body == 2 else (upper, lower)
-        interface = copied(self.interface, slipped=slipped)
+        interface = copied(self.interface, slipped=bodies.interface.slipped)
         return replace(self, contact=contact, neumann=neumann, interface=interface, problem=problem)
 
     def swapped(self) -> ContactPair:
@@ -216,7 +216,7 @@ class ContactPair(Value):
                 raise SingularRole.of(self.problem, self.contact.mesh_body, self.neumann.mesh_body)
             raise SingularRole(self.source, self.contact_body, self.contact.motions.shape[1])
         named = self.problem is not None and self.problem.contact.named
-        if (self.interface.transfer is not None or named) and self.problem is not None:
+        if (named or not self.interface.one_grid) and self.problem is not None:
             return pair_from(self.problem.swapped(), law=self.interface.law, like=self)
         if self.problem is not None and self.contact.grid.dimension == 2:
             bodies = [side.mesh_body for side in (self.body1, self.body2)]
@@ -287,7 +287,7 @@ class ContactPair(Value):
     @property
     def same_traces(self) -> bool:
         """True if both bodies have the same traces: one grid, and the same components held."""
-        return self.interface.transfer is None and np.array_equal(self.contact.free, self.neumann.free)
+        return self.interface.one_grid and np.array_equal(self.contact.free, self.neumann.free)
 
     def bound(self, force: Floats) -> Floats:
         """Return the friction bound ``w_j k_j |(S sigma_N)_j|``, shape (t,), for nodal forces on the Neumann grid."""
@@ -341,7 +341,7 @@ def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | N
     known = (None, None) if like is None else (like.body1, like.body2)
     upward, grids = iteration.neumann_body == 2, (bodies.interface.contact, bodies.interface.neumann)
     interface = bodies.interface
-    if like is not None and like.interface.slipped is not None:
+    if like is not None and like.interface.slipped.any():
         if not interface.contact.equals(like.interface.contact):
             raise problem.refuse("contact", None, "needed the contact nodes of the increment, on which it has slipped")
         interface = replace(interface, slipped=like.interface.slipped)

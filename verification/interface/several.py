@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 from fem1d2d import Mesh, MeshError, Supports
 from fem1d2d.mesh import Floats, Ints
 from verification.interface.friction import OF_TWO
-from verification.interface.interface import Grid, Interface, Law, Nodes, Stretch
+from verification.interface.interface import Grid, Interface, Law, Stretch
 from verification.interface.joining import check_profile, join
 from verification.problem.specification import Problem
 from verification.problem.specs import Line
@@ -186,10 +186,9 @@ def _one_after_another(problem: Problem, parts: Sequence[Interface], flipped: Se
             )
         )
     P = None
-    if any(part.transfer is not None for part in parts):
-        P = block_diag(*(np.eye(part.contact.n) if part.transfer is None else part.transfer for part in parts))
+    if not all(part.one_grid for part in parts):
+        P = block_diag(*(part.transfer for part in parts))
     gap = np.concatenate([part.gap for part in parts])
-    held, *planes = (np.concatenate(masks) for masks in zip(*map(_masks, parts), strict=True))
     return Interface.joining(
         grids[0],
         grids[0 if P is None else 1],
@@ -197,12 +196,6 @@ def _one_after_another(problem: Problem, parts: Sequence[Interface], flipped: Se
         gap=gap,
         law=law,
         lines=tuple(lines),
-        held=held if held.any() else None,
-        planes=(planes[0], planes[1]) if planes[0].any() else None,
+        held=np.concatenate([part.held for part in parts]),
+        planes=tuple(np.concatenate(each) for each in zip(*(part.planes for part in parts), strict=True)),
     )
-
-
-def _masks(part: Interface) -> tuple[Nodes, Nodes, Nodes]:
-    """Return the nodes of a line that are held, and those on a plane of symmetry on each grid."""
-    none = np.zeros(part.contact.n, dtype=bool), np.zeros(part.neumann.n, dtype=bool)
-    return none[0] if part.held is None else part.held, *(part.planes or none)

@@ -147,7 +147,7 @@ def _evidence(id: str, found: Sequence[Witness]) -> list[Evidence]:
     repaired = max(max(r.values()) if everywhere else r[id] for r in (w.ratios(printed=False) for w in found))
     # the forces differ little, so that a quotient is right to about four digits; equal ones: the first stays
     worst = int(np.argmax([figure(value, 2) for value in printed]))
-    differ = sum(w.difference.setting.pair.interface.transfer is not None for w in found)
+    differ = sum(not w.difference.setting.pair.interface.one_grid for w in found)
     problems = f"{len(found)} problems, of which {differ} have grids that differ"
     count = {"seed": SEED, "problems": len(found), "pairs": len(found), "grids_differ": {"problems": differ}}
     data = {

@@ -156,7 +156,7 @@ class Case:
     @property
     def grids_differ(self) -> bool:
         """True if the bodies have different grids along Gamma_c."""
-        return self.weak.pair.interface.transfer is not None
+        return not self.weak.pair.interface.one_grid
 
     @cached_property
     def solution(self) -> Fields:
@@ -371,7 +371,7 @@ def moves_in_K(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> F
     normal, up = weak.pair.contact.grid.normal, weak.pair.normal_sign
     rows = weak.one.interface[normal]
     room = -weak.jump(u.one, u.two)[normal][:, None]
-    one_grid = weak.pair.interface.transfer is None
+    one_grid = weak.pair.interface.one_grid
     first = (rng.random(one.shape[1]) < 0.5) | (not one_grid)
     above = up * one[rows], weak.carried(two)[normal]
     if one_grid:

@@ -110,7 +110,7 @@ class Trial:
     @property
     def grids_differ(self) -> bool:
         """True if the bodies have different grids along Gamma_c."""
-        return self.pair.interface.transfer is not None
+        return not self.pair.interface.one_grid
 
     def across(self, forms: tuple[Floats, Floats]) -> list[float]:
         """The largest quotients of each form over the other body's squared norm of H^1/2(Gamma_c).

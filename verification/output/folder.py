@@ -104,7 +104,7 @@ class Folder:
             _csv(room / "history.csv", "residuals in the norm (5.21), relative ones without unit", result.table())
             write_interface(result.pair, room / "interface.npz")
         interface = result.pair.interface_along_y if isinstance(result, Run) else result.bodies.interface
-        if interface.transfer is not None:
+        if not interface.one_grid:
             write_transfer(interface, room / "P.npz")
         write_fields(result, room)
         self._problem(room, result)

@@ -150,7 +150,7 @@ def solution(found: Solution) -> Sections:
 
 def _grids(problem: Problem, contact_body: int, interface: Interface) -> list[Shown]:
     """The body that carries the contact grid, if there are two grids."""
-    if interface.transfer is None:
+    if interface.one_grid:
         return []
     own, other = f"the {PLACES[contact_body]} body", f"the {PLACES[3 - contact_body]}"
     if interface.contact.normals is not None:  # either body may lie above

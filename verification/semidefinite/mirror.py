@@ -45,11 +45,8 @@ class Mirror:
         same = _alike(contact.grid.weights, contact.grid.weights[::-1]) and _alike(
             interface.kernel, interface.kernel[::-1, ::-1]
         )
-        if interface.transfer is not None:
-            same = same and _alike(interface.transfer, interface.transfer[::-1, ::-1])
-        if interface.on_traces is not None:
-            columns = _reflected(interface.on_traces, contact.grid).T
-            same = same and _alike(interface.on_traces, _reflected(columns, neumann.grid).T)
+        P = interface.carry(np.eye(neumann.grid.size))
+        same = same and _alike(P, _reflected(_reflected(P, contact.grid).T, neumann.grid).T)
         if not (same and _is_even(contact.schur, contact.grid) and _is_even(neumann.schur, neumann.grid)):
             return None
         L_2, carried = neumann.root, forms.carried

@@ -78,7 +78,7 @@ class TraceForms:
         self._families = families(contact, force, jump, weight, zeta)
         self._sizes = families(contact, np.abs(force), np.abs(jump), weight, zeta_size)
         # inner products over nodes (a transfer has them too), over traces twice, and the scalars, weights and sums
-        self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 30
+        self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.one_grid else 4) * contact.n + 30
         self._free = _changed(S_2, near[:1])
         self._free_error = self._error(np.abs(S_2), near[:1])
 

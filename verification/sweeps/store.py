@@ -163,8 +163,9 @@ def _of_pair(pair: ContactPair) -> dict[str, Any]:
         for name, value in vars(pair.settings).items()
         if name in SETTINGS or value != getattr(default, name)
     }
-    arrays: dict[str, Any] = {"gap": interface.gap, "transfer": interface.transfer}
-    arrays |= {name: v for name in ("on_traces", "slipped") if (v := getattr(interface, name)) is not None}
+    arrays: dict[str, Any] = {"gap": interface.gap, "transfer": None if interface.one_grid else interface.transfer}
+    arrays |= {} if interface.join.alike else {"on_traces": interface.carry(np.eye(interface.neumann.size))}
+    arrays |= {"slipped": interface.slipped} if interface.slipped.any() else {}
     for name, side in (("contact", pair.contact), ("neumann", pair.neumann)):
         arrays |= {f"{name}.{part}": getattr(side, attribute) for part, attribute in ARRAYS.items()}
         arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}

@@ -85,11 +85,10 @@ def _interfaces(draw: st.DrawFn, law: Law, length: float) -> Interface:
     x = spread(draw(st.integers(2, 8)))
     contact = Grid.on(x)
     if law.of_contact or draw(st.booleans()):
-        return Interface(contact=contact, neumann=contact, gap=np.zeros(contact.n), law=law)
+        return Interface.joining(contact, contact, None, gap=np.zeros(contact.n), law=law)
     y = spread(draw(st.integers(2, 8)))
     neumann = Grid.on(y * x[-1] / y[-1])
-    transfer = interpolation(x, neumann.x)
-    return Interface(contact=contact, neumann=neumann, gap=np.zeros(contact.n), law=law, transfer=transfer)
+    return Interface.joining(contact, neumann, interpolation(x, neumann.x), gap=np.zeros(contact.n), law=law)
 
 
 @st.composite
@@ -150,10 +149,12 @@ def _is_independent_of_units(law: Law, interface: Interface) -> None:
 
 def _sees_no_sides(law: Law, interface: Interface) -> None:
     mirror = lambda grid: Grid(x=-grid.x[::-1], weights=grid.weights[::-1])
-    transfer = None if interface.transfer is None else interface.transfer[::-1, ::-1]
-    contact = mirror(interface.contact)
-    neumann = contact if transfer is None else mirror(interface.neumann)
-    image = replace(interface, contact=contact, neumann=neumann, transfer=transfer)
+    image = replace(
+        interface,
+        contact=mirror(interface.contact),
+        neumann=mirror(interface.neumann),
+        join=interface.join.mapped(lambda P: P[::-1, ::-1]),
+    )
     _same(law.operator(image)[::-1, ::-1], law.operator(interface), "in a mirror")
 
 
@@ -203,7 +204,7 @@ def norms(law: Law, length: float = 1.0) -> list[float]:
     for cells in CELLS:
         x, stiff = _normal_stiffness(cells)
         grid = Grid.on(length * x)
-        S = np.asarray(law.operator(Interface(contact=grid, neumann=grid, gap=np.zeros(grid.n), law=law)))
+        S = np.asarray(law.operator(Interface.joining(grid, grid, None, gap=np.zeros(grid.n), law=law)))
         root = np.sqrt(grid.weights)[:, None] * S
         found.append(float(np.sqrt(np.linalg.eigvalsh(root @ stiff @ root.T)[-1])))
     return found

@@ -161,7 +161,7 @@ def describe(value: Any) -> str:
         "weights": value.contact.grid.weights,
         "gap": interface.gap,
         "kernel": interface.kernel,
-        "transfer": interface.transfer,
+        "transfer": None if interface.one_grid else interface.transfer,
         "friction": value.friction,
         "neumann_body": value.neumann_body,
     }

@@ -86,7 +86,7 @@ def _contracting(draw: st.DrawFn) -> ContactPair:
     pair = draw(pairs())
     if not pair.friction:
         return pair
-    roles = [pair] if pair.interface.transfer is not None else [pair, pair.swapped()]
+    roles = [pair, pair.swapped()] if pair.interface.one_grid else [pair]
     thresholds = [measure(role).friction_threshold for role in roles]
     allowed = min(0.0 if threshold is None else threshold.value for threshold in thresholds)
     return pair.at(friction=min(pair.friction, Fraction(allowed) / 2))
@@ -168,7 +168,7 @@ def _ends(kit: Kit, rule: Rule) -> Finding:
     def test(pair: ContactPair) -> None:
         g, error = solution(pair)
         roles = [(pair, g, error)]
-        if pair.interface.transfer is None:
+        if pair.interface.one_grid:
             swapped = pair.swapped()
             turned = -pair.neumann.grid.turn(g)  # the force on the other body, along the other normal
             roles.append((swapped, turned, _in(swapped, pair, error)))
@@ -196,7 +196,7 @@ def _ends(kit: Kit, rule: Rule) -> Finding:
 
 def _in(role: ContactPair, other: ContactPair, error: float) -> float:
     """An error in the norm (5.21) of one role, in the norm of the other role: at most sqrt(rho) times as large."""
-    rho = measure(role).rho_max if other.interface.transfer is None else None
+    rho = measure(role).rho_max if other.interface.one_grid else None
     # g' S_b^-1 g <= lambda g' S_a^-1 g with lambda = lambda_max(S_a, S_b)
     assert rho is not None
     return sqrt(rho.value) * error

@@ -88,8 +88,8 @@ def mirrored(pair: ContactPair) -> ContactPair:
         )
 
     turn = lambda matrix: None if matrix is None else matrix[::-1, ::-1].copy()
-    gap, transfer = interface.gap[::-1], turn(interface.transfer)
-    return _of_matrices(pair, side, turn(interface.kernel), gap=gap, transfer=transfer)
+    join = interface.join.mapped(lambda P: P[::-1, ::-1].copy())
+    return _of_matrices(pair, side, turn(interface.kernel), gap=interface.gap[::-1], join=join)
 
 
 def upside_down(pair: ContactPair) -> ContactPair:

@@ -89,7 +89,7 @@ def test_the_coupled_residual_is_that_of_each_condition_at_each_node(data, step)
         assert found is None or norm(iterate.g) > 0
         return
     t, n = pair.contact.grid.t, pair.contact.grid.n
-    P = np.eye(n) if pair.interface.transfer is None else pair.interface.transfer
+    P = pair.interface.transfer
     weights = pair.contact.grid.weights, pair.neumann.grid.weights
     off = iterate.g - iterate.image
     stresses = [P @ (off[i : i + len(weights[1])] / weights[1]) for i in range(0, len(off), len(weights[1]))]

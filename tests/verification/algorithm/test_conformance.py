@@ -421,8 +421,8 @@ def test_pairs_are_of_every_kind():
 
     draw()
     for kind in (
-        lambda pair: pair.problem is None and pair.interface.transfer is None,
-        lambda pair: pair.interface.transfer is not None,
+        lambda pair: pair.problem is None and pair.interface.one_grid,
+        lambda pair: not pair.interface.one_grid,
         lambda pair: pair.problem is not None and pair.contact.grid.dimension == 2,
         lambda pair: pair.contact.grid.dimension == 1,
         lambda pair: pair.friction > 0,

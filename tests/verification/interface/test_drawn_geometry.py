@@ -154,7 +154,7 @@ def test_a_disc_on_a_plane_gets_the_neumann_problem_and_no_other_role(tmp_path):
     with pytest.raises(vf.ProblemError, match=remedy):
         vf.run(disc.swapped())
     pair = vf.build(disc)
-    assert pair.interface.transfer is None
+    assert pair.interface.one_grid
     with pytest.raises(vf.ProblemError, match=remedy):  # shares what is condensed, and finds no Gamma_c anew
         pair.swapped()
     advice = vf.advise(pair)

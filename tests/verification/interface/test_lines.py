@@ -198,7 +198,7 @@ def test_a_flat_line_by_name_is_the_interval(tmp_path):
     named = vf.Problem.from_dict(data | {"contact": data["contact"] | {"surface": ["deck", "bottom"]}})
     assert named.digest != plain.digest
     one, two = vf.build(plain), vf.build(named)
-    assert two.interface.on_traces is None
+    assert two.interface.join.alike
     assert two.interface.contact.normals is None
     assert np.abs(one.contact.schur - two.contact.schur).max() == 0
     assert np.abs(one.interface.transfer - two.interface.transfer).max() <= 1e-14
@@ -272,7 +272,7 @@ def test_the_matrices_of_exact_normals_lie_within_their_radius(name, tmp_path):
 
 def test_an_interface_file_keeps_a_line(tmp_path):
     pair = vf.build(shaft(tmp_path))
-    assert pair.interface.on_traces is not None
+    assert not pair.interface.join.alike
     for one in (pair, vf.build(shaft(tmp_path, neumann_body=1))):
         write_interface(one, tmp_path / "interface.npz")
         again = read_interface(tmp_path / "interface.npz")

@@ -15,6 +15,7 @@ from dense_oracle import DenseBody, DensePair, symmetric, top
 from section_5 import PAIRS, assert_all_hold, draw_pair, ratios, thetas_for
 
 from verification.interface.interface import Interface
+from verification.interface.join import Mortar
 from verification.ledger.cases import NAMED, PROBLEMS, problem
 from verification.ledger.convergence import RunsOfLevel, there_and_back
 from verification.ledger.differences import Difference
@@ -198,7 +199,7 @@ def test_a_transfer_that_is_off_by_a_millionth_is_found_out_in_the_weak_forms(na
     def holds(change):
         P = interface.transfer.copy()
         P[middle, P[middle].argmax()] += change
-        pair = replace(case.weak.pair, interface=replace(interface, transfer=P))
+        pair = replace(case.weak.pair, interface=replace(interface, join=Mortar(nodal=P)))
         other = type("Given", (Case,), kept | {"weak": Weak(pair=pair)})(name=name, problem=case.problem)
         return CHECKS[statement](type("Only", (RunsOfLevel,), {"cases": [other]})(level="quick"))[-1].holds
 

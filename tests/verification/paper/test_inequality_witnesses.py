@@ -156,7 +156,7 @@ IDS = [f"{w[0]}: {w[1]}" for w in WITNESSES] + [f"{w[0]}: {w[1]}, grids that dif
 @pytest.mark.parametrize(("name", "mutant", "make", "choose"), WITNESSES + APART_WITNESSES, ids=IDS)
 def test_a_smaller_constant_is_found_out(name, mutant, make, choose):
     case, forces = witness(make, choose)
-    assert (case.pair.interface.transfer is not None) == ((name, mutant, make, choose) in APART_WITNESSES)
+    assert (not case.pair.interface.one_grid) == ((name, mutant, make, choose) in APART_WITNESSES)
     c = case.constants
     changed = MUTANTS[mutant](case, c)
     for theta in (0.9999, c.C0 / 2):

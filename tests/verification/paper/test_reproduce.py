@@ -34,7 +34,7 @@ def test_the_family_has_the_paper_s_numbers_of_nodes_and_grids_that_differ(nodes
     problem = vf.example(f"section6-{nodes}")
     bodies = discretise(problem)
     assert sum(len(body.mesh.points) for body in bodies.elastic) == nodes
-    assert bodies.interface.transfer is not None
+    assert not bodies.interface.one_grid
     assert problem.refined(1).body1.cells == tuple(2 * n for n in problem.body1.cells)
 
 

@@ -52,7 +52,7 @@ def in_rationals(pair, k, near, multipliers, square, cross, step, weight):
     """The form of :meth:`TraceForms.with_multipliers`, condition by condition, from the matrices of the pair."""
     contact, neumann = pair.contact.grid, pair.neumann.grid
     S_1, S_2, kernel = (array(exact(m)) for m in (pair.contact.schur, pair.neumann.schur, pair.interface.kernel))
-    P = array(exact(np.eye(n) if pair.interface.transfer is None else pair.interface.transfer))
+    P = array(exact(pair.interface.transfer))
     zeros = np.full((2 * n, neumann.size), fmpq(0), dtype=object)
     both = zeros.copy()
     both[contact.tangential, neumann.tangential] = both[contact.normal, neumann.normal] = P
