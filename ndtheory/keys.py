@@ -257,11 +257,12 @@ def _rows(cls: type) -> Iterator[Row]:
         if one.spread:
             yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,)),)
             continue
+        if inside and kind.startswith("map of "):  # its members have a row
+            name, kind = f"{name}.*", kind.removeprefix("map of ")
         yield one.row(name, kind)
         yield from (each.row(f"{name}.{below}", each.type) for below, each in one.inside.items())
         for row in _rows(inside) if inside else ():
-            below = f"{name}.*" if kind.startswith("map") else name
-            yield replace(row, keys=tuple(f"{below}.{each}" for each in row.keys))
+            yield replace(row, keys=tuple(f"{name}.{each}" for each in row.keys))
     for above in _explained(cls):
         yield Row(keys=(f"{above}.reason".lstrip("."),), type="map of text", says="why a key is null")
 

@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
+from ndtheory.keys import Part, key
 from ndtheory.number import Level, Numeric, above, below
 from verification.machine.progress import Progress, silent
 from verification.value import to_plain
@@ -211,23 +212,21 @@ class BoundResult:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Region:
-    """The (theta, k) for which a bound proves contraction.
+class Region(Part):
+    """The (theta, k) for which a bound proves contraction; below the first friction the region does not shrink."""
 
-    Attributes
-    ----------
-    k : tuple of float
-        Friction, increasing; below the first value the region does not shrink, and between two the border is a line.
-    theta : tuple of pairs of float
-        Contraction for lo < theta < hi.
-    every, some : float, float or None
-        Friction below which every small theta contracts, or some theta; None where that was not worked out.
-    """
-
-    k: tuple[float, ...]
-    theta: tuple[Ends, ...]
-    every: float
-    some: float | None
+    k: tuple[float, ...] = key(
+        "friction, increasing: between two of them the border is a straight line, off by at most 1 %", unit="1"
+    )
+    theta: tuple[Ends, ...] = key("for each `k` the ends of the interval of theta", unit="1")
+    every: float = key("friction below which every small theta contracts", unit="1", name="every_small_theta")
+    some: float | None = key(
+        "friction below which some theta does",
+        unit="1",
+        name="some_theta",
+        null="where it was not worked out",
+        why=None,
+    )
 
 
 class NotComputed(RuntimeError):

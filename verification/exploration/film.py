@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
+from ndtheory.keys import Part, key, says
 from verification.algorithm.history import History
 from verification.algorithm.runs import Run, run
 from verification.bounds.bound import Bound, NotComputed, Region, Subject
@@ -42,15 +43,11 @@ STATES = ("stick", "slip", "open")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Shown:
+class FilmedRun(Part):
     """One run as a page shows it.
 
     Attributes
     ----------
-    theta, friction : float
-    outcome : str
-        As of a run; or why there is none.
-    iterations, rate : int or None, float or None
     residuals : tuple of float
         The relative residual of every step.
     steps : tuple of int
@@ -66,11 +63,15 @@ class Shown:
         By bound: the factor that it proves for one step; None where it has no conclusion.
     """
 
-    theta: float
-    friction: float
-    outcome: str
-    iterations: int | None
-    rate: float | None
+    theta: float = key(unit="1")
+    friction: float = key(unit="1")
+    outcome: str = key("as in **Run**; or why there is no run, or why a history ended early")
+    iterations: int | None = key(
+        "of a history those of all increments", unit="1", null="where there is no run", why=None
+    )
+    rate: float | None = key(
+        "observed rate as in **Run**", unit="1", null="where too few steps show it, and of a history", why=None
+    )
     residuals: tuple[float, ...]
     steps: tuple[int, ...]
     left_out: int
@@ -80,25 +81,28 @@ class Shown:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Film:
+class Film(Part):
     """Runs of one pair on a grid.
 
-    Attributes
-    ----------
-    pair, measured : ContactPair, Measured
-        The bodies in these roles at the problem's friction.
-    runs : tuple of tuple of Shown
-        By friction, then theta.
-    regions : mapping from str to Region
-        Where each bound that follows from the constants proves contraction.
-    why_no_region : str
+    ``pair`` has these roles and the problem's friction; ``lines`` are runs by friction, then theta; ``regions`` are
+    those of the bounds that follow from the constants.
     """
 
     pair: ContactPair
     measured: Measured
-    runs: tuple[tuple[Shown, ...], ...]
+    lines: tuple[tuple[FilmedRun, ...], ...]
     regions: dict[str, Region]
     why_no_region: str
+
+    @property
+    @says("1 or 2")
+    def neumann_body(self) -> int:
+        return self.pair.neumann_body
+
+    @property
+    @says("a run for each friction and theta; of a problem with steps a loading history for each friction")
+    def runs(self) -> list[FilmedRun]:
+        return [each for line in self.lines for each in line]
 
 
 def film(
@@ -134,7 +138,7 @@ def film(
         regions = {bound.name: bound.region(Subject.of(pair, measured)) for bound in calculated}
     except (ProblemError, NotComputed) as error:
         why = str(error)
-    return Film(pair=pair, measured=measured, runs=tuple(runs), regions=regions, why_no_region=why)
+    return Film(pair=pair, measured=measured, lines=tuple(runs), regions=regions, why_no_region=why)
 
 
 def _factor(bound: Bound, subject: Subject, theta: Fraction) -> float | None:
@@ -142,16 +146,16 @@ def _factor(bound: Bound, subject: Subject, theta: Fraction) -> float | None:
     return None if factor is None else factor.value
 
 
-def _shown(pair: ContactPair, theta: Fraction, farthest: float, factors: dict[str, float | None]) -> Shown:
+def _shown(pair: ContactPair, theta: Fraction, farthest: float, factors: dict[str, float | None]) -> FilmedRun:
     at: dict[str, Any] = {"theta": float(theta), "friction": float(pair.friction), "factors": factors}
     try:
         made = run(pair, theta=theta, rule="constant")
     except ContactError as error:
         at |= {"outcome": str(error), "iterations": None, "rate": None, "steps": (), "residuals": ()}
-        return Shown(**at, left_out=0, frames=np.zeros((0, 0), np.int8), sizes=())
+        return FilmedRun(**at, left_out=0, frames=np.zeros((0, 0), np.int8), sizes=())
     candidates = {step: _frame(made, step) for step in steps_shown(made.history)}
     near = {step: each for step, each in candidates.items() if each[1][0] <= farthest or not step}
-    return Shown(
+    return FilmedRun(
         **at,
         outcome=made.outcome,
         iterations=made.iterations,
@@ -164,11 +168,11 @@ def _shown(pair: ContactPair, theta: Fraction, farthest: float, factors: dict[st
     )
 
 
-def past(history: History) -> Shown:
+def past(history: History) -> FilmedRun:
     """A loading history as a run of a film: each increment is a step, with its relative residual."""
     runs = [each.run for each in history.increments if each.run is not None]
     shown = [_frame(each, len(each.iterates) - 1) for each in runs]
-    return Shown(
+    return FilmedRun(
         theta=float(runs[0].theta),
         friction=float(runs[0].pair.friction),
         outcome=history.ended or "converged",
@@ -209,7 +213,7 @@ def steps_shown(history: Sequence[float]) -> list[int]:
 
 def packed(found: Film) -> dict[str, Any]:
     """The runs of a film as data of a page: numbers of each run, and all frames as one text in base 64."""
-    every = [each for line in found.runs for each in line]
+    every = found.runs
     firsts = iter(np.cumsum([0, *(len(each.steps) for each in every)]).tolist())
     rounded = lambda value, digits: None if value is None or not np.isfinite(value) else float(f"{value:.{digits}g}")
     runs = [
@@ -226,7 +230,7 @@ def packed(found: Film) -> dict[str, Any]:
             }
             for each in line
         ]
-        for line in found.runs
+        for line in found.lines
     ]
     frames = np.concatenate([each.frames.ravel() for each in every])
     return {

@@ -13,6 +13,7 @@ import numpy as np
 
 from ndtheory import __version__
 from ndtheory.energy_norms import one_minus_square, predicted_factor, predicted_theta
+from ndtheory.keys import key, says
 from verification.algorithm.history import History, march
 from verification.algorithm.runs import run
 from verification.bounds.bound import Region
@@ -45,32 +46,41 @@ FORMULAS = (
 )
 
 
+#: What keys of exact numbers share that documents have in doubles.
+DOUBLES: dict[str, Any] = {
+    "unit": "1",
+    "type": "list of number",
+    "of": lambda values: [float(value) for value in values],
+}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Exploration(Document):
     """Runs of one problem at several theta and frictions, in both roles of the bodies; or its loading histories.
 
-    Attributes
-    ----------
-    problem : Problem
-    thetas, frictions : tuple of Fraction
-        The grid; all runs have a constant theta.
-    films : tuple of Film
-        One for each role, the role of the problem first.
-    why_one_role : str
-        Why the roles cannot be exchanged; empty where they can.
-    histories : tuple of History
-        By friction, where the problem has steps: the one film then has one theta, and the increments for steps.
+    ``own`` are the places of the problem's theta and friction.  ``histories`` are by friction, where the problem has
+    steps: the one film then has one theta, and the increments for steps.
     """
 
     schema: ClassVar[str] = "ndtheory.explore/1"
 
     problem: Problem
-    thetas: tuple[Fraction, ...]
-    frictions: tuple[Fraction, ...]
+    thetas: tuple[Fraction, ...] = key("the grid; of a problem with steps one theta", name="theta", **DOUBLES)
+    frictions: tuple[Fraction, ...] = key("the grid", name="friction", **DOUBLES)
     own: tuple[int, int]
-    films: tuple[Film, ...]
+    films: tuple[Film, ...] = key("the roles of the file, and the roles exchanged where that is possible", name="roles")
     why_one_role: str
     histories: tuple[History, ...] = ()
+
+    @property
+    @says("title of the problem")
+    def title(self) -> str:
+        return self.problem.title
+
+    @property
+    @says("`roles`: why the roles cannot be exchanged")
+    def reason(self) -> dict[str, str]:
+        return {"roles": self.why_one_role} if self.why_one_role else {}
 
     @property
     def units(self) -> Any:  # type: ignore[override]
@@ -82,23 +92,6 @@ class Exploration(Document):
         if self.histories:
             return f"{self.problem.title}, {count} loading histories at {len(self.frictions)} frictions"
         return f"{self.problem.title}, {count} runs at {len(self.thetas)} thetas and {len(self.frictions)} frictions"
-
-    def content(self) -> dict[str, Any]:
-        """Return the values of ``ndtheory.explore/1``."""
-        names = ("theta", "friction", "outcome", "iterations", "rate")
-        return {
-            "title": self.problem.title,
-            "theta": [float(theta) for theta in self.thetas],
-            "friction": [float(k) for k in self.frictions],
-            "roles": [
-                {
-                    "neumann_body": found.pair.neumann_body,
-                    "runs": [{name: getattr(each, name) for name in names} for line in found.runs for each in line],
-                }
-                for found in self.films
-            ],
-            "reason": {"roles": self.why_one_role} if self.why_one_role else {},
-        }
 
     def page(self) -> str:
         """Return the page: HTML that loads nothing from other files or hosts."""
@@ -146,7 +139,7 @@ class Exploration(Document):
 
     @property
     def _bounds(self) -> list[str]:
-        return list(self.films[0].runs[0][0].factors)
+        return list(self.films[0].runs[0].factors)
 
     def _role(self, found: Film) -> dict[str, Any]:
         energy = found.measured.energy_constants()
@@ -277,7 +270,7 @@ def _histories(given: Problem | ContactPair, whole: Problem, progress: Progress)
         thetas=(Fraction(runs[0][0].theta),),
         frictions=tuple(done),
         own=(0, list(done).index(pair.friction)),
-        films=(Film(pair=pair.under(rest), measured=own.measured, runs=runs, regions={}, why_no_region=""),),
+        films=(Film(pair=pair.under(rest), measured=own.measured, lines=runs, regions={}, why_no_region=""),),
         why_one_role="a loading history keeps the roles of the file",
         histories=tuple(done.values()),
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 from shlex import quote
 
 from verification import registry
-from verification.exploration.film import Shown
+from verification.exploration.film import FilmedRun
 from verification.exploration.page import Exploration
 from verification.problem.specs import PLACES
 from verification.show.numbers import NONE, count, figures, near_one
@@ -22,7 +22,7 @@ def sections(found: Exploration, target: Path | None = None) -> Sections:
     rows: list[tuple[Cell, ...]] = []
     for each in found.films:
         body = each.pair.neumann_body
-        for line in each.runs:
+        for line in each.lines:
             rows.append((f"{body} ({PLACES[body]})", figures(line[0].friction, 2), *_best(line)))
     head = ("Neumann body", "k", "theta", "steps", "rate", "converged")
     caption = "For each role and friction the theta with the fewest steps, and how many of the thetas converged."
@@ -59,7 +59,7 @@ def _histories(found: Exploration, then: str) -> Sections:
     )
 
 
-def _best(line: tuple[Shown, ...]) -> tuple[Cell, ...]:
+def _best(line: tuple[FilmedRun, ...]) -> tuple[Cell, ...]:
     arrived = [each for each in line if each.outcome == "converged" and each.iterations is not None]
     of_all = f"{len(arrived)} of {len(line)}"
     if not arrived:

@@ -9,20 +9,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from verification.figures.style import THETA, legend_beside, new_figure, plain, styled
+from verification.figures.style import legend_beside, new_figure, plain, styled
 from verification.registry import draw as main_figure
-from verification.sweeps.row import Row
+from verification.sweeps.row import Row, title
 from verification.sweeps.sweep import Sweep
 
-#: Labels of axes; the others have the name of their column.
-WORDS = {
-    "theta": THETA,
-    "friction": "coefficient of friction k",
-    "iterations": "steps to the tolerance of the residual",
-    "iterations_paper": "steps by the test of Section 6.3",
-    "refine": "halvings of the mesh",
-    "rho": "rho",
-}
 MARKERS = "osD^vPX*"
 
 #: The end of the colour map: what follows is too light on white.
@@ -67,8 +58,8 @@ def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figur
                         *zip(*pairs, strict=True), f"{MARKERS[i % len(MARKERS)]}-", color=shade, ms=3.5, label=label
                     )
                     label = None
-        ax.set_xlabel(_label(x, sweep))
-        ax.set_ylabel(_label(y, sweep))
+        ax.set_xlabel(plain(title(x, sweep.units)))
+        ax.set_ylabel(plain(title(y, sweep.units)))
         ax.set_title(plain(sweep.summary))
         if any(key for key in colours):
             legend_beside(ax)
@@ -81,11 +72,6 @@ def _drawn(value: Any) -> bool:
 
 def _text(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _label(name: str, sweep: Sweep) -> str:
-    unit = {"young1": "stress", "young2": "stress", "radius": "length"}.get(name)
-    return plain(WORDS.get(name, name) + (f" ({sweep.units[unit]})" if unit else ""))
 
 
 def draw_rules(panels: Mapping[str, Sequence[Row]], *, columns: int = 2) -> Figure:

@@ -13,35 +13,11 @@ import numpy as np
 from ndtheory import __version__
 from verification.algorithm.relaxation import Rule
 from verification.extras import require
-from verification.sweeps.row import RESULTS, TEXTS
+from verification.sweeps.row import COLUMNS, RESULTS, title
 from verification.sweeps.sweep import Sweep
 
 if TYPE_CHECKING:
     import xarray
-
-#: Full names of the results and the axes.
-NAMES = {
-    "theta": "relaxation factor",
-    "friction": "coefficient of friction k",
-    "young1": "Young's modulus of body 1",
-    "young2": "Young's modulus of body 2",
-    "neumann_body": "body of the Neumann problem",
-    "refine": "halvings of the mesh",
-    "law": "law of friction",
-    "radius": "radius of the kernel of S",
-    "rule": "rule of relaxation",
-    "iterations": "steps to the tolerance of the unrelaxed residual",
-    "iterations_paper": "steps by the test of Section 6.3",
-    "steps": "steps done",
-    "outcome": "how the run ended",
-    "observed_rate": "rate at the end of the run",
-    "linearised_rate": "rate of the linearisation",
-    "coupled_residual": "violation of contact by the joined state at the end",
-    "energy_factor": "q(theta) of the theorem in energy norms",
-    "proved_rate": "proved rate",
-    "rho": "rho",
-    "reason": "why results are missing",
-}
 
 #: The outcome of a row that was not made.
 MISSING = "missing"
@@ -64,8 +40,10 @@ def dataset(sweep: Sweep) -> xarray.Dataset:
 
     axes = sweep.grid.axes
     shape = tuple(len(values) for values in axes.values())
-    units = {"young1": sweep.units["stress"], "young2": sweep.units["stress"], "radius": sweep.units["length"]}
-    attributes = lambda name, words: {"long_name": NAMES[name]} | ({} if words else {"units": units.get(name, "1")})
+    units = {"1": "1"} | dict(sweep.units)
+
+    def attributes(name: str, words: bool) -> dict[str, str]:
+        return {"long_name": title(name, {})} | ({} if words else {"units": units[COLUMNS[name].unit]})
 
     coordinates: dict[str, Any] = {}
     for name, values in axes.items():
@@ -82,7 +60,7 @@ def dataset(sweep: Sweep) -> xarray.Dataset:
 
     variables: dict[str, Any] = {}
     for name in RESULTS:
-        words = name in TEXTS
+        words = COLUMNS[name].type == "text"
         flat: Any = np.full(len(sweep.grid), "" if words else np.nan, dtype=object if words else float)
         if name == "outcome":
             flat[:] = MISSING

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
+from ndtheory.keys import Part, key
 from verification.algorithm.ending import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
 from verification.constants import Measured, measure
@@ -32,28 +33,28 @@ MOST_STEPS = 300
 
 
 @dataclass(frozen=True, kw_only=True)
-class Point:
-    """Outcome of a run; ``coupled_residual`` as in :class:`verification.Run`."""
+class Point(Part):
+    """Outcome of a run."""
 
-    theta: float
-    k: float
-    outcome: Outcome
-    iterations: int
-    coupled_residual: float | None
+    theta: float = key("where in the plane", unit="1")
+    k: float = key("where in the plane", unit="1")
+    outcome: Outcome = key("as in **Run**", type="text")
+    iterations: int = key(unit="1")
+    coupled_residual: float | None = key("as in **Run**", unit="1", null="without a force", why=None)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Plane(Document):
-    """Regions by bound, and runs; ``reason`` says why a bound has no region, or that Ctrl-C left ``points`` out."""
+    """Regions by bound, and runs."""
 
     schema: ClassVar[str] = "ndtheory.region/1"
 
-    title: str
-    regions: Mapping[str, Region]
-    points: tuple[Point, ...]
-    reason: Mapping[str, str]
+    title: str = key("title of the problem")
+    regions: Mapping[str, Region] = key("where a bound proves contraction, by the name of the bound")
+    points: tuple[Point, ...] = key("the runs")
+    reason: Mapping[str, str] = key("why a bound has no region, or points are missing")
     units: Mapping[str, str]
-    problem: Problem | None = None
+    problem: Problem
 
     @property
     def summary(self) -> str:
@@ -63,22 +64,6 @@ class Plane(Document):
     def interrupted(self) -> bool:
         """True if Ctrl-C left something out."""
         return "points" in self.reason
-
-    def content(self) -> dict[str, Any]:
-        return {
-            "title": self.title,
-            "regions": {
-                name: {
-                    "k": list(region.k),
-                    "theta": [list(ends) for ends in region.theta],
-                    "every_small_theta": region.every,
-                    "some_theta": region.some,
-                }
-                for name, region in self.regions.items()
-            },
-            "points": [vars(point) for point in self.points],
-            "reason": dict(self.reason),
-        }
 
 
 def chart(problem: Problem, *, store: Path | None = None, progress: Progress = silent) -> Plane:

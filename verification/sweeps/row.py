@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 from ndtheory import HypothesisError
 from ndtheory.energy_norms import one_minus_square
+from ndtheory.keys import Key
 from ndtheory.texts import printable
 from verification.algorithm.monolithic import SolveError
 from verification.algorithm.relaxation import Constant, Rule, rule_of
@@ -35,22 +36,65 @@ Changes = tuple[tuple[str, Any], ...]
 #: Number of constants that are kept.  Of what holds matrices the last one is kept: rows that share it are neighbours.
 KEPT = 16
 
-#: The columns of a row that the grid may vary.
-GIVEN = ("theta", "friction", "young1", "young2", "neumann_body", "refine", "law", "radius", "rule")
-
 #: Outcomes of a row without a run.  A refused row is refused again; an error may have had a reason that passes.
 REFUSED, ERROR = "refused", "error"
 FAILED = (REFUSED, ERROR)
 
-#: The columns of a row after the values of the grid.
-RESULTS = (
-    *("iterations", "iterations_paper", "steps", "outcome", "observed_rate", "linearised_rate"),
-    *("coupled_residual", "energy_factor", "proved_rate", "rho", "reason"),
-)
+_number = partial(Key, type="number", unit="1")
+_whole = partial(Key, type="integer", unit="1")
+_text = partial(Key, type="text")
+REFUSED_MATRICES = "where the row was refused and the pair comes from matrices"
+NO_MODULUS = "of a rigid body, and of a pair made from matrices"
 
-#: The columns of whole numbers and of texts; the others are numbers.
-WHOLE = ("neumann_body", "refine", "iterations", "iterations_paper", "steps")
-TEXTS = ("law", "rule", "outcome", "reason")
+#: The columns of a row: first the values of the grid, then the results.  A meaning begins with the column's full name.
+COLUMNS = {
+    "theta": _number(says="relaxation factor theta; the one that was used", null='where "auto" or a rule found none'),
+    "friction": _number(says="coefficient of friction k", null=REFUSED_MATRICES),
+    "young1": _number(says="Young's modulus of body 1", unit="stress", null=NO_MODULUS),
+    "young2": _number(says="Young's modulus of body 2", unit="stress", null=NO_MODULUS),
+    "neumann_body": _whole(says="body of the Neumann problem", null=REFUSED_MATRICES),
+    "refine": _whole(says="halvings of the mesh"),
+    "law": _text(says="law of friction", null="of a pair made from matrices that has none"),
+    "radius": _number(says="radius of the kernel of S", unit="length", null="where the problem has none"),
+    "rule": _text(says="rule of relaxation"),
+    "iterations": _whole(
+        says="steps to the tolerance of the unrelaxed residual; as a run counts them", null="where it was not reached"
+    ),
+    "iterations_paper": _whole(
+        says="steps by the test of Section 6.3; n at which it is met:"
+        r" $\lvert g_n - g_{n-1}\rvert_2/\lvert g_n\rvert_2 < 10^{-9}$ or $\lvert g_n - g_{n-1}\rvert_2 < 10^{-9}$ in"
+        " the unit of force",
+        null="where it was not before the run ended",
+    ),
+    "steps": _whole(says="steps done; whatever the outcome", null="where there was no run"),
+    "outcome": _text(
+        says="how the run ended; as in **Run**; `refused` where the problem has no such run, `error` where a"
+        " computation gave none"
+    ),
+    "observed_rate": _number(says="rate at the end of the run; as in **Run**", null="where the run shows none"),
+    "linearised_rate": _number(says="rate of the linearisation; as in **Run**", null="where it was not linearised"),
+    "coupled_residual": _number(
+        says="violation of contact by the joined state at the end; as in **Run**", null="without a force or a run"
+    ),
+    "energy_factor": _number(
+        says="q(theta) of the theorem in energy norms; proved on this mesh; it bounds the growth where it is 1 or more",
+        null="outside the theorem and of a rule without a constant theta",
+    ),
+    "proved_rate": _number(
+        says="proved rate; below 1, of this run on this mesh: `energy_factor` of a constant theta, the rule's own rate"
+        " of momentum without friction",
+        null="elsewhere",
+    ),
+    "rho": _number(says="rho; for the roles of the row", null="where it does not exist"),
+    "reason": _text(says="why results are missing; by the names of the columns", null="where none is"),
+}
+RESULTS = tuple(COLUMNS)[9:]
+
+
+def title(column: str, units: Mapping[str, str]) -> str:
+    """Return the full name of a column, with its unit where that is not 1."""
+    one = COLUMNS[column]
+    return one.says.partition(";")[0] + (f" ({units[one.unit]})" if one.unit in units else "")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -38,7 +38,7 @@ from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.registry import LAWS, RULES
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.row import ERROR, GIVEN, RESULTS, TEXTS, WHOLE, Row, problem_of
+from verification.sweeps.row import COLUMNS, ERROR, Row, problem_of
 
 #: The solver of step II in a row: the active set, and the model where that does not settle.
 SOLVER = "auto"
@@ -400,15 +400,16 @@ def _row(key: object, outcome: object, text: object, crc: object) -> Row | None:
 
 def is_row(found: Any) -> bool:
     """Return True if a value that was read from JSON has the columns of a row, each of its type and printable."""
-    if not isinstance(found, dict) or found.keys() != {*GIVEN, *RESULTS} or not found["outcome"]:
+    if not isinstance(found, dict) or found.keys() != COLUMNS.keys() or not found["outcome"]:
         return False
     return all(value is None or _fits(name, value) for name, value in found.items())
 
 
 def _fits(name: str, value: Any) -> bool:
-    if name in TEXTS:
+    kind = COLUMNS[name].type
+    if kind == "text":
         return isinstance(value, str) and clean(value)
-    if isinstance(value, bool) or not isinstance(value, int if name in WHOLE else (int, float)):
+    if isinstance(value, bool) or not isinstance(value, int if kind == "integer" else (int, float)):
         return False
     return abs(value) <= sys.float_info.max  # not NaN
 

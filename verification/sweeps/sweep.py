@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import __version__
+from ndtheory.keys import key, says
 from verification.document import Document
 from verification.interface.files import read_interface
 from verification.interface.pair import UNITS, ContactPair
@@ -18,7 +19,7 @@ from verification.problem.files import load
 from verification.problem.specification import Problem
 from verification.spreadsheet import as_csv
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.row import FAILED, Row, problem_of
+from verification.sweeps.row import COLUMNS, FAILED, Row, problem_of
 from verification.sweeps.store import Store
 from verification.sweeps.workers import Work, alone, together
 
@@ -32,16 +33,8 @@ class Sweep(Document):
 
     Attributes
     ----------
-    rows : tuple of dict
-        One for each run, in the order of :meth:`verification.sweeps.grid.SweepGrid.rows`.
-    asked : int
-        Number of rows of the grid; Ctrl-C may have left some out.
-    axes : tuple of str
-        The columns that vary.
-    grid : SweepGrid
-        The grid of all rows.
-    places : tuple of int
-        The place of each row among the rows of the grid.
+    grid, places : SweepGrid, tuple of int
+        The grid of all rows, and the place of each row among them; Ctrl-C may have left some out.
     stored : int
         Number of rows that a store had already.
     notes : tuple of str
@@ -50,9 +43,9 @@ class Sweep(Document):
 
     schema: ClassVar[str] = "ndtheory.sweep/1"
 
-    rows: tuple[Row, ...]
-    asked: int
-    axes: tuple[str, ...]
+    axes: tuple[str, ...] = key("the columns that vary")
+    asked: int = key("how many rows the grid has", unit="1")
+    rows: tuple[Row, ...] = key("one run each, theta changing fastest", type="list of object", inside=COLUMNS)
     units: Mapping[str, str]
     grid: SweepGrid
     places: tuple[int, ...]
@@ -72,8 +65,8 @@ class Sweep(Document):
         return len(self.rows) < self.asked
 
     @property
+    @says("why rows are missing")
     def reason(self) -> dict[str, str]:
-        """Why rows are missing."""
         return {"rows": f"interrupted after {len(self.rows)} of {self.asked} rows"} if self.interrupted else {}
 
     def table(self) -> dict[str, list[Any]]:
@@ -112,14 +105,6 @@ class Sweep(Document):
         head += [f"interrupted after {len(self.rows)} of {self.asked} rows"] * self.interrupted
         head += [] if self.problem is None else self.problem.to_toml().splitlines()
         return as_csv(head, self.columns, ([each[name] for name in self.columns] for each in self.rows))
-
-    def content(self) -> dict[str, Any]:
-        return {
-            "axes": list(self.axes),
-            "asked": self.asked,
-            "rows": [dict(each) for each in self.rows],
-            "reason": self.reason,
-        }
 
 
 @dataclass(kw_only=True)

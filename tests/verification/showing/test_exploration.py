@@ -137,7 +137,7 @@ def test_a_step_that_leaves_the_picture_leaves_out_no_later_one():
     sizes = [max(float(np.abs(u).max()) for u in made.traces_at(each)) for each in made.iterates]
     farthest = max(sizes) / 2
     found = film(pair, vf.measure(pair), [made.theta], [pair.friction], farthest, silent)
-    (shown,) = found.runs[0]
+    (shown,) = found.lines[0]
     assert made.outcome == "stalled"
     assert shown.residuals == tuple(made.history)
     assert list(shown.steps) == [i for i in steps_shown(made.history) if sizes[i] <= farthest]

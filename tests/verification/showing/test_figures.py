@@ -174,7 +174,14 @@ def plane():
         for i, outcome in enumerate(OUTCOMES, 1)
     ]
     regions = {name: region(10.0**-i) for i, name in enumerate(reversed(BOUNDS))}
-    return Plane(title="all", regions=regions, points=tuple(points), reason={}, units={"length": "mm", "stress": "MPa"})
+    return Plane(
+        title="all",
+        regions=regions,
+        points=tuple(points),
+        reason={},
+        problem=vf.example("section6"),
+        units={"length": "mm", "stress": "MPa"},
+    )
 
 
 def test_the_border_of_a_region_is_a_line_between_two_frictions_on_linear_and_on_logarithmic_axes(plane):
