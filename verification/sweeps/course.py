@@ -422,7 +422,7 @@ def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, 
     walked: list[tuple[Floats, Floats]] = []
     kinds: list[object] = []
     outcome: Outcome | None = None
-    paper, why, n, least, since = None, "", -1, math.inf, 0
+    paper, why, n, lowest, since = None, "", -1, math.inf, 0
     before = first = np.zeros(0)
     piece: tuple[bytes, ...] = ()
     evaluated: Callable[[], Iterate]
@@ -444,7 +444,7 @@ def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, 
                     residuals.append(residual)
                     kinds.append(taken.pattern)
                     outcome, evaluated = ended, here
-                    least, since = (residual, 0) if residual < least else (least, since + 1)
+                    lowest, since = (residual, 0) if residual < lowest else (lowest, since + 1)
                     if lean and (since > WANDERS or abs(residual - bound * scale) <= TIE * bound * scale):
                         return None
                 if outcome and ((paper is not None and paper <= n) or ending.given_up(n, residual)):

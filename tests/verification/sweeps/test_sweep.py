@@ -408,6 +408,15 @@ def test_a_shelf_keeps_the_last_used_within_its_bytes_and_at_least_one():
     assert made[4:] == ["large", "e", "large"]
 
 
+def test_steps_on_one_affine_piece_are_taken_together(monkeypatch):
+    evaluated, original = [], course.iterate_at
+    monkeypatch.setattr(course, "iterate_at", lambda *args: evaluated.append(args) or original(*args))
+    monkeypatch.setattr(course, "iterates", None)  # which evaluates them one by one
+    [found] = vf.sweep(SMALL, theta=["0.3"]).rows
+    assert found["outcome"] == "converged"
+    assert len(evaluated) < found["steps"] / 4
+
+
 def test_rows_that_are_refused_for_one_reason_find_it_once(monkeypatch):
     made, condense = [], of_rows.pair_from
     monkeypatch.setattr(of_rows, "pair_from", lambda *args, **named: made.append(args) or condense(*args, **named))
