@@ -88,7 +88,7 @@ COLUMNS = {
     "rho": _number(says="rho; for the roles of the row", null="where it does not exist"),
     "reason": _text(says="why results are missing; by the names of the columns", null="where none is"),
 }
-RESULTS = tuple(COLUMNS)[9:]
+GIVEN, RESULTS = tuple(COLUMNS)[:9], tuple(COLUMNS)[9:]
 
 
 def title(column: str, units: Mapping[str, str]) -> str:
