@@ -4,11 +4,11 @@ The document of a result, the reason beside each key that is null, the table of 
 
 >>> @dataclass(frozen=True, kw_only=True)
 ... class Plan(Part):
-...     asked: int = key("number of rows of the grid", unit="1")
-...     stored: int | None = key("rows that the store has", unit="1", null="without a store")
+...     asked: int = key("number of rows of the grid")
+...     stored: int | None = key("rows that the store has", null="without a store")
 ...
 ...     @property
-...     @says("rows that would be made", unit="1")
+...     @says("rows that would be made")
 ...     def left(self) -> int:
 ...         return self.asked - (self.stored or 0)
 >>> Plan(asked=3, stored=None).to_dict()
@@ -19,6 +19,7 @@ The document of a result, the reason beside each key that is null, the table of 
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, replace
@@ -35,6 +36,9 @@ T = TypeVar("T")
 #: The types of Python as those of the tables; a class of parts is named, or an object with keys of its own.
 TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"}
 
+#: The types that have a unit.
+NUMBERS = {"integer", "number", "Number"}
+
 #: The value of a key that is left out although its value could also be null.
 ABSENT: Any = object()
 
@@ -47,12 +51,15 @@ class Key:
 
     Attributes
     ----------
-    says, unit : str
-        Its meaning and its unit; empty where there is none.
+    says : str
+        Its meaning.
+    unit : str or None
+        Its unit; by default numbers are pure, of the unit 1.
     null, absent : str or None
         When the value is null, and when the key is left out; None for never.
-    why : str or function of the result
-        The reason beside a null; the result's own ``reason`` by this name goes first, ``null`` comes last.
+    why : str or function of the result, or None
+        The reason beside a null; the result's own ``reason`` by this name goes first, ``null`` comes last.  None where
+        no reason stands beside it.
     name : str
         Its name, with dots for objects inside, where that is not the name of the field.
     of : function, optional
@@ -61,17 +68,20 @@ class Key:
         Its type, where that does not follow from the annotation.
     spread : bool
         True if the value is a part whose keys stand among those of the result.
+    inside : dict of Key, optional
+        The keys of a dictionary, or of each one in a list, with their types.
     """
 
     says: str = ""
-    unit: str = ""
+    unit: str | None = None
     null: str | None = None
     absent: str | None = None
-    why: str | Callable[[Any], str] = ""
+    why: str | Callable[[Any], str] | None = ""
     name: str = ""
     of: Callable[[Any], Any] | None = None
     type: str = ""
     spread: bool = False
+    inside: Mapping[str, Key] = field(default_factory=dict)
     order: int = field(default_factory=lambda: next(_order))
 
     def reason(self, result: Any, name: str) -> str:
@@ -80,6 +90,16 @@ class Key:
         if own is not None:
             return own
         return self.why(result) if callable(self.why) else self.why or self.null or ""
+
+    @property
+    def explained(self) -> bool:
+        """True if a reason stands beside a null."""
+        return self.null is not None and self.why is not None
+
+    def row(self, name: str, kind: str) -> Row:
+        """Its row in a table."""
+        unit = self.unit if self.unit is not None else "1" if NUMBERS & {*kind.split()} else ""
+        return Row(keys=(name,), type=kind, unit=unit, says=self.says, null=self.null, absent=self.absent)
 
 
 def _once(compute: Callable[[type], T]) -> Callable[[type], T]:
@@ -93,13 +113,27 @@ def key(says: str = "", *, default: Any = MISSING, default_factory: Any = MISSIN
 
 
 def says(says: str = "", **more: Any) -> Callable[[F], F]:
-    """Make a property a key: this decorator stands below ``@property``; arguments as of :class:`Key`."""
+    """Make a property a key: this decorator stands below ``@property``; arguments as of :class:`Key`.
+
+    Without a meaning the key has that of the docstring's first paragraph.
+    """
 
     def mark(function: F) -> F:
-        vars(function)["key"] = Key(says=says, **more)
-        return function
+        summary = " ".join((function.__doc__ or "").partition("\n\n")[0].split()).replace("``", "`").rstrip(".")
+        return _marked(function, Key(says=says or summary[:1].lower() + summary[1:], **more))
 
     return mark
+
+
+def _marked(function: F, one: Key) -> F:
+    vars(function)["key"] = one
+    return function
+
+
+def derived(says: str, of: Callable[[Any], Any], hint: Any = str, **more: Any) -> Any:
+    """A property of a type that only looks a value up in parts of a result, as a key; arguments as of :class:`Key`."""
+    of.__annotations__["return"] = hint
+    return property(_marked(of, Key(says=says, **more)), doc=says)
 
 
 class Part:
@@ -139,13 +173,16 @@ def document(result: Any) -> dict[str, Any]:
         if value is ABSENT or (value is None and one.absent is not None and one.null is None):
             continue
         if one.spread:
+            reasons = found.get("reason", {})
             found |= plain(value)
+            if reasons:
+                found["reason"] = reasons | found["reason"]
             continue
         name = one.name or attribute
         above, _, last = name.rpartition(".")
         inside = _inside(found, above)
         inside[last] = plain(value)
-        if inside[last] is None and one.null is not None:
+        if inside[last] is None and one.explained and above in explained:
             inside["reason"][last] = one.reason(result, name)
     for above in explained:  # it comes last
         inside = _inside(found, above)
@@ -165,14 +202,18 @@ def _inside(found: dict[str, Any], above: str) -> dict[str, Any]:
 def _explained(cls: type) -> tuple[str, ...]:
     """The objects of a document that have reasons: those with a key that may be null, unless it has its own."""
     names = {one.name or attribute: one for attribute, one in keys(cls).items()}
-    found = dict.fromkeys(name.rpartition(".")[0] for name, one in names.items() if one.null is not None)
+    found = dict.fromkeys(name.rpartition(".")[0] for name, one in names.items() if one.explained)
     return tuple(above for above in found if f"{above}.reason".lstrip(".") not in names)
 
 
 def plain(value: Any) -> Any:
-    """A value as documents have it."""
-    if value is None or isinstance(value, (bool, int, float, str)):
+    """A value as documents have it; a number that is not finite is null."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (bool, int, str)):
         return value
+    if hasattr(value, "content"):  # a document inside another one
+        return value.content()
     if hasattr(value, "to_dict"):
         return value.to_dict()
     if isinstance(value, Mapping):
@@ -237,27 +278,35 @@ def _rows(cls: type) -> Iterator[Row]:
     for attribute, one in keys(cls).items():
         kind, inside = (one.type, None) if one.type else named_type(annotation(cls, attribute))
         name = one.name or attribute
+        if one.inside and not one.type:
+            kind = "list of object" if kind.startswith("list") else "object"
         if one.spread:
-            yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,)),)
+            yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,), says=one.says),)
             continue
-        yield Row(keys=(name,), type=kind, unit=one.unit, says=one.says, null=one.null, absent=one.absent)
+        yield one.row(name, kind)
+        yield from (each.row(f"{name}.{below}", each.type) for below, each in one.inside.items())
         for row in _rows(inside) if inside else ():
             below = f"{name}.*" if kind.startswith("map") else name
             yield replace(row, keys=tuple(f"{below}.{each}" for each in row.keys))
-    for above in _explained(cls):
+    among = [annotation(cls, attribute) for attribute, one in keys(cls).items() if one.spread]
+    for above in set(_explained(cls)).difference(*map(_explained, among)):  # these bring their own row
         yield Row(keys=(f"{above}.reason".lstrip("."),), type="map of text", says="why a key is null")
 
 
 def annotation(cls: type, attribute: str) -> Any:
     """The type of a field or property; names that its module imports for types alone are not known."""
+    base, text = written(cls, attribute)
+    return eval(text, {**vars(sys.modules[base.__module__]), **vars(base)}) if isinstance(text, str) else text
+
+
+def written(cls: type, attribute: str) -> tuple[type, Any]:
+    """The class that has a field or property, and its type as it is written there."""
     for base in cls.__mro__:
         value = vars(base).get(attribute)
         function = getattr(value, "fget", None) or getattr(value, "func", None)
-        written = vars(base).get("__annotations__", {}).get(attribute)
-        written = function.__annotations__["return"] if function else written
-        if written is not None:
-            known = {**vars(sys.modules[base.__module__]), **vars(base)}
-            return eval(written, known) if isinstance(written, str) else written
+        text = function.__annotations__["return"] if function else vars(base).get("__annotations__", {}).get(attribute)
+        if text is not None:
+            return base, text
     raise AttributeError(f"{cls.__name__}.{attribute} has no type")
 
 
@@ -278,21 +327,3 @@ def named_type(hint: Any) -> tuple[str, type | None]:
     if isinstance(hint, type) and issubclass(hint, Part):
         return (hint.part, None) if hint.part else ("object", hint)
     return TYPES.get(hint, "free"), None
-
-
-def parts(cls: type) -> dict[str, type]:
-    """The classes of the named parts that the table of a class refers to, by their names, also those inside them."""
-    found: dict[str, type] = {}
-    for attribute, one in keys(cls).items():
-        for each in _classes(annotation(cls, attribute)) if not one.type else ():
-            if each.part not in found:
-                found |= {each.part: each} if each.part else {}
-                found |= {name: one for name, one in parts(each).items() if name not in found}
-    return found
-
-
-def _classes(hint: Any) -> Iterator[type[Part]]:
-    if isinstance(hint, type) and issubclass(hint, Part):
-        yield hint
-    for inside in get_args(hint):
-        yield from _classes(inside)

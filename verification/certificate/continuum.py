@@ -169,7 +169,7 @@ class ContinuumCertificate(Document):
         if energy is None:
             reason |= dict.fromkeys(OF_ENERGY, c.reason.get("rho", ""))
         else:
-            none = {name: why for name, why in energy.reason.items() if name in OF_ENERGY}
+            none = {name: why for name, why in energy.to_dict()["reason"].items() if name in OF_ENERGY}
             reason |= none | ({"friction_limit": "no friction"} if limit is None else {})
         at_most = lambda value: None if value is None else upper(Fraction(value)).to_dict()
         at_least = lambda value: None if value is None else lower(Fraction(value)).to_dict()
