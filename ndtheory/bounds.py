@@ -19,20 +19,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from ndtheory.constants import Constants, Corner, relaxation_factor
 from ndtheory.errors import HypothesisError
+from ndtheory.keys import Part, key
 from ndtheory.number import DIGITS, SLACK, Level, Number, Numeric, decimal, rounded, weakest, working_precision
 from ndtheory.scalar import Scalar, maximum, minimum, sqrt, where
 
 Conclusion = Literal["contraction", "no conclusion"]
 
-#: Why there is no ``interval_proved``.
-NO_PROVED_INTERVAL = "the constants have no enclosures, or some of those enclosed have no interval"
+#: The meaning of a factor in documents.
+FACTOR = "the factor of one step in the norm (5.21), and 1 minus it without cancellation"
 
 #: The ends of the open intervals count as outside, with a margin far above the rounding of the evaluation.
 MARGIN = Decimal(10) ** -(DIGITS // 2)
@@ -187,32 +188,26 @@ def factor_and_rest(gain: Scalar) -> tuple[Scalar, Scalar]:
     return q, gain / (1 + q)
 
 
+def _no_factor(answer: Answer) -> str:
+    return "no theta given" if answer.theta is None else "theta outside the interval: no conclusion"
+
+
 @dataclass(frozen=True, kw_only=True)
-class Answer:
-    """The values that the answers of both theorems share, in the norms of the paper and in energy norms.
+class Answer(Part):
+    """The values that the answers of both theorems share, in the norms of the paper and in energy norms."""
 
-    Attributes
-    ----------
-    interval : tuple of float or None
-        Contraction is proved for lo < theta < hi <= 1; None where it is proved for no theta.
-    interval_proved : tuple of float or None
-        Thetas that contract whichever of the constants enclosed are the true ones; None if there are none, or no
-        enclosures.
-    theta : float or None
-        The theta of the question; None where none was given.
-    factor, one_minus_factor : Number or None
-        The bound of the Lipschitz constant of T_theta in the norm (5.21), below 1, and 1 minus it without cancellation.
-        None outside the interval: nothing is bounded there.
-    verdict : {'contraction', 'no conclusion'} or None
-        Whether theta lies in the interval; None without theta.
-    """
-
-    interval: tuple[float, float] | None
-    interval_proved: tuple[float, float] | None
-    theta: float | None
-    factor: Number | None
-    one_minus_factor: Number | None
-    verdict: Conclusion | None
+    interval: tuple[float, float] | None = key(
+        "the thetas that contract, inside (0, 1)", null="where there are none", why=lambda answer: answer.why
+    )
+    interval_proved: tuple[float, float] | None = key(
+        "those that contract for all the constants enclosed",
+        null="where there are none, or no enclosures",
+        why="the constants have no enclosures, or some of those enclosed have no interval",
+    )
+    theta: float | None = key("the one asked about", null="without one", why="no theta given")
+    factor: Number | None = key(FACTOR, null="where there is no conclusion", why=_no_factor)
+    one_minus_factor: Number | None = key(FACTOR, null="where there is no conclusion", why=_no_factor)
+    verdict: Conclusion | None = key("`contraction` or `no conclusion`", null="without theta", why="no theta given")
 
     @staticmethod
     def shared(
@@ -234,82 +229,42 @@ class Answer:
             "verdict": None if theta is None else "no conclusion" if found["factor"] is None else "contraction",
         }
 
-    @property
-    def reason(self) -> dict[str, str]:
-        """Why a value is None, by its name."""
-        reasons: dict[str, str] = {}
-        if self.interval_proved is None:
-            reasons["interval_proved"] = NO_PROVED_INTERVAL
-        if self.theta is None:
-            reasons |= dict.fromkeys(("theta", "factor", "one_minus_factor", "verdict"), "no theta given")
-        elif self.factor is None:
-            reasons |= dict.fromkeys(("factor", "one_minus_factor"), "theta outside the interval: no conclusion")
-        return reasons
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``editions.<name>`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
-        values = {
-            field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("edition", "why")
-        }
-        plain = lambda value: list(value) if isinstance(value, tuple) else value
-        numbers = {name: value.to_dict() for name, value in values.items() if isinstance(value, Number)}
-        return {name: plain(value) for name, value in values.items()} | numbers | {"reason": self.reason}
-
 
 #: The numbers of an edition.
 NAMES = ("C_K", "C_T", "C_T_tilde", "C0", "C1", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor")
+
+
+_THRESHOLD: dict[str, Any] = {
+    "says": "thresholds of Proposition 5.6 on k, or on C_K where C_s and C_tr are not known",
+    "unit": "1 or stress",
+    "null": "where every friction is below",
+    "why": "C_s C_tr = 0: every friction coefficient is below",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds(Answer):
     """The answer of an edition: ``factor`` is K(theta), ``interval`` has all cases of Proposition 5.6, None from C2 on.
 
-    Attributes
-    ----------
-    edition : Edition
-    C_K, C_T, C_T_tilde : Number
-        Friction constant (stress) and the Lipschitz constants (5.16), (5.35).
-    C0, C1 : Number
-        Section 5's ends of the interval of theta, dimensionless.
-    C2, C3, C4, C5 : Number or None
-        Thresholds of Proposition 5.6, on k where C_s and C_tr are known, else on C_K.
-        None: C_s C_tr = 0, any k is below.
-    C6 : Number or None
-        None unless a' < -1.
-    proved : bool
-        Whether the proof behind this edition holds for these constants, all that are enclosed.
-    threshold_on : {'k', 'C_K'}
-        The constant to which C2 to C5 apply.
-    why : str
-        Reason for an interval of None.
+    ``why`` is the reason for an interval of None.
     """
 
-    edition: Edition
-    C_K: Number
-    C_T: Number
-    C_T_tilde: Number
-    C0: Number
-    C1: Number
-    C2: Number | None
-    C3: Number | None
-    C4: Number | None
-    C5: Number | None
-    C6: Number | None
-    proved: bool
-    threshold_on: Literal["k", "C_K"]
-    why: str = "friction at or above C2"
+    part: ClassVar[str] = "Bound of Section 5"
 
-    @property
-    def reason(self) -> dict[str, str]:
-        """Why a value is None, by its name."""
-        reasons = super().reason
-        if self.C2 is None:
-            reasons |= dict.fromkeys(("C2", "C3", "C4", "C5"), "C_s C_tr = 0: every friction coefficient is below")
-        if self.C6 is None:
-            reasons["C6"] = "a' >= -1: no lower end but 0"
-        if self.interval is None:
-            reasons["interval"] = self.why
-        return reasons
+    edition: Edition
+    C_K: Number = key("friction constant", unit="stress")
+    C_T: Number = key("Lipschitz constants (5.16), (5.35)")
+    C_T_tilde: Number = key("Lipschitz constants (5.16), (5.35)")
+    C0: Number = key("where the two estimates of the factor meet, and the end of the interval of theta")
+    C1: Number = key("where the two estimates of the factor meet, and the end of the interval of theta")
+    C2: Number | None = key(**_THRESHOLD)
+    C3: Number | None = key(**_THRESHOLD)
+    C4: Number | None = key(**_THRESHOLD)
+    C5: Number | None = key(**_THRESHOLD)
+    C6: Number | None = key("lower end of the interval", null="where that is 0", why="a' >= -1: no lower end but 0")
+    proved: bool = key("whether the proof behind this edition holds for these constants, all that are enclosed")
+    threshold_on: Literal["k", "C_K"] = key("`k` or `C_K`")
+    why: str = "friction at or above C2"
 
     def without_conclusion(self, why: str) -> Bounds:
         """The same constants, and no theta that contracts."""

@@ -24,10 +24,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from ndtheory.bounds import MARGIN, Answer, factor_and_rest
 from ndtheory.constants import EnergyConstants, relaxation_factor
+from ndtheory.keys import key
 from ndtheory.number import SLACK, Number, Numeric, decimal, rounded, weakest, working_precision
 from ndtheory.scalar import Scalar, absolute, maximum, minimum, sqrt, where
 
@@ -309,55 +310,37 @@ def _last_where(holds: Callable[[Scalar], bool], low: Scalar, high: Scalar) -> S
     return where(holds(high), high, halved)
 
 
+_CONSTANT = r"the constants in the bound; $\rho$ is the normal one without friction"
+_PREDICTED = r"$2/(2+\rho)$ and $\rho/(2+\rho)$: proved without friction, no bound with it"
+_PROVED: dict[str, Any] = {"null": "where none is proved", "why": lambda bounds: bounds.why}
+_RUBS = {"null": "without friction", "why": "no friction"}
+
+
 @dataclass(frozen=True, kw_only=True)
 class EnergyBounds(Answer):
     """The answer of the theorem in energy norms: ``factor`` is q(theta), ``interval`` is None where q >= 1 everywhere.
 
-    Attributes
-    ----------
-    rho : Number
-        The one that enters q: rho_normal without friction, where it is known.
-    kappa_1, kappa_2 : Number
-    ratio : Number
-        r, the largest ``|d_1|/|d_2|``.
-    friction_multiple : Number or None
-        The factor by which friction may grow until no small theta is proved: times k it is the threshold k_s.  None
-        without friction.
-    friction_limit_multiple : Number or None
-        The factor by which it may grow until no theta at all is proved: times k it is k_e >= k_s.  None without
-        friction.
-    theta_proved : float or None
-        The theta of least q; None where q >= 1 everywhere.
-    factor_proved : Number or None
-        q there.
-    theta_max_proved : Number or None
-        The upper end of the interval.
-    theta_predicted, rate_predicted : float
-        ``2/(2 + rho)`` and ``rho/(2 + rho)``: proved without friction, a prediction with it.
+    Times k the multiples of friction are the thresholds k_s and k_e >= k_s.
     """
 
-    rho: Number
-    kappa_1: Number
-    kappa_2: Number
-    ratio: Number
-    friction_multiple: Number | None
-    friction_limit_multiple: Number | None
-    theta_proved: float | None
-    factor_proved: Number | None
-    theta_max_proved: Number | None
-    theta_predicted: float
-    rate_predicted: float
+    part: ClassVar[str] = "Bound in energy norms"
+    why: ClassVar[str] = "q >= 1 for every theta"
 
-    @property
-    def reason(self) -> dict[str, str]:
-        """Why a value is None, by its name."""
-        reasons = super().reason
-        if self.friction_multiple is None:
-            reasons |= dict.fromkeys(("friction_multiple", "friction_limit_multiple"), "no friction")
-        if self.interval is None:
-            names = ("interval", "theta_proved", "factor_proved", "theta_max_proved")
-            reasons |= dict.fromkeys(names, "q >= 1 for every theta")
-        return reasons
+    rho: Number = key(_CONSTANT)
+    kappa_1: Number = key(_CONSTANT)
+    kappa_2: Number = key(_CONSTANT)
+    ratio: Number = key(
+        "the largest ratio of the differences of displacement of the contact body and of the Neumann body"
+    )
+    friction_multiple: Number | None = key(
+        "by which friction may grow until no small theta is proved", null="without friction", why="no friction"
+    )
+    friction_limit_multiple: Number | None = key("by which it may grow until no theta is proved", **_RUBS)
+    theta_proved: float | None = key("the theta of least factor", **_PROVED)
+    factor_proved: Number | None = key("the factor there", **_PROVED)
+    theta_max_proved: Number | None = key("end of the interval", **_PROVED)
+    theta_predicted: float = key(_PREDICTED)
+    rate_predicted: float = key(_PREDICTED)
 
 
 def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) -> EnergyBounds:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
+from ndtheory.keys import derived, key, says
 from ndtheory.number import Numeric
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import StepRatio, largest_step_ratio
@@ -14,9 +15,9 @@ from verification.algorithm.reference import Reference, by_cvxpy_alone
 from verification.algorithm.relaxation import Constant
 from verification.algorithm.runs import Run, check_memory, run
 from verification.algorithm.theta import Choice, begin
-from verification.bounds.bound import NOT_ASKED, BoundResult, Subject
+from verification.bounds.bound import BY_NAME, NOT_ASKED, BoundResult, Subject
 from verification.bounds.losses import Losses
-from verification.bounds.table import chosen
+from verification.bounds.table import EnergyOfPair, chosen
 from verification.bounds.verdicts import Judgement, judge_bound, judge_forecast
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
@@ -57,22 +58,19 @@ class Listener:
         """The bounds that need the matrices of the pair."""
 
 
+def _beside_each_other(bounds: Mapping[str, BoundResult]) -> dict[str, BoundResult]:
+    """The bounds without a key of their own."""
+    return {name: bound for name, bound in bounds.items() if not BOUNDS[name].apart}
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Comparison(Document):
     """Constants, bounds, a run, and a verdict of the run on each bound.
 
     Attributes
     ----------
-    measured : Measured
     bounds : mapping from name to BoundResult
         From the weakest to the strongest.
-    losses : Losses or None
-        The factor that each inequality of the proof loses.
-    run : Run
-    step_ratio : StepRatio or None
-        The largest Lipschitz quotient seen.
-    cvxpy : Reference or None
-        The run repeated with every step taken from cvxpy's own answer.
     verdicts : mapping from the name of a bound to Judgement
         And of ``linearised``, the forecast made half way.
     reason : mapping
@@ -81,14 +79,59 @@ class Comparison(Document):
 
     schema: ClassVar[str] = "ndtheory.compare/1"
 
-    measured: Measured
-    bounds: Mapping[str, BoundResult]
-    losses: Losses | None
-    run: Run
-    step_ratio: StepRatio | None
-    cvxpy: Reference | None
-    verdicts: Mapping[str, Judgement]
+    measured: Measured = key("measured on the mesh", name="constants")
+    bounds: Mapping[str, BoundResult] = key(name="bounds.editions", of=_beside_each_other, inside=BY_NAME)
+    losses: Losses | None = key(
+        "how much each inequality of the proof loses", null="where it was not worked out, or `lmi` was not asked for"
+    )
+    run: Run = key("the iteration, linearised at its end")
+    step_ratio: StepRatio | None = key(
+        "the largest Lipschitz quotient of T between iterates", null="where no step is clear of rounding errors"
+    )
+    cvxpy: Reference | None = key(
+        "the run repeated with every step II taken from cvxpy's own answer",
+        null="where it gave none, or `lmi` was not asked for",
+    )
+    verdicts: Mapping[str, Judgement] = key(
+        "one for each bound and for `linearised`, the forecast: `CONSISTENT`, `VIOLATED`, `INCONCLUSIVE`, "
+        "`HYPOTHESES_NOT_MET` or `NOT_COMPUTED`",
+        of=lambda verdicts: {name: judgement.verdict for name, judgement in verdicts.items()},
+        type="map of text",
+    )
     reason: Mapping[str, str]
+
+    title = derived("title of the problem", lambda comparison: comparison.run.pair.title)
+    energy = derived(
+        "the bound in energy norms",
+        lambda comparison: comparison.objects.get("energy"),
+        EnergyOfPair,
+        null=r"where $\rho$ does not exist, or it was not asked for",
+    )
+    lmi = derived(
+        "the semidefinite bound",
+        lambda comparison: comparison.objects.get("lmi"),
+        type="Semidefinite bound",
+        null="where it was not worked out, as with more than 100 contact nodes",
+    )
+
+    @property
+    @says()
+    def reasons(self) -> dict[str, str]:
+        """Why that verdict."""
+        return {name: judgement.reason for name, judgement in self.verdicts.items()}
+
+    @property
+    @says(name="bounds.reason")
+    def not_computed(self) -> dict[str, str]:
+        """Why one of `bounds.editions` is null."""
+        bounds = _beside_each_other(self.bounds)
+        return {name: bound.not_computed for name, bound in bounds.items() if not bound.worked_out}
+
+    @property
+    def objects(self) -> dict[str, Any]:
+        """The documents of single bounds, which are beside ``bounds``."""
+        own = [BOUNDS[name].objects(result, self.measured) for name, result in self.bounds.items()]
+        return {key: value for objects in own for key, value in objects.items()}
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
@@ -102,7 +145,7 @@ class Comparison(Document):
     @property
     def summary(self) -> str:
         verdicts = ", ".join(f"{name} {judgement.verdict}" for name, judgement in self.verdicts.items())
-        return f"{self.run.pair.title}, {self.run.outcome}; {verdicts}"
+        return f"{self.title}, {self.run.outcome}; {verdicts}"
 
     def tell(self, listener: Listener) -> None:
         """Pass each part to a listener, in the order in which they were computed."""
@@ -137,30 +180,7 @@ class Comparison(Document):
         return any(judgement.verdict == "INCONCLUSIVE" for judgement in self.verdicts.values())
 
     def content(self) -> dict[str, Any]:
-        editions = {name: result.to_dict() for name, result in self.bounds.items() if not BOUNDS[name].apart}
-        return {
-            "title": self.run.pair.title,
-            "constants": self.measured.content(),
-            "bounds": {
-                "editions": editions,
-                "reason": {name: self.bounds[name].not_computed for name, value in editions.items() if value is None},
-            },
-            **self._objects(),
-            "losses": None if self.losses is None else self.losses.to_dict(),
-            "run": self.run.content(),
-            "step_ratio": None
-            if self.step_ratio is None
-            else {"value": self.step_ratio.value, "interval": [self.step_ratio.lo, self.step_ratio.hi]},
-            "cvxpy": None if self.cvxpy is None else self.cvxpy.to_dict(),
-            "verdicts": {name: judgement.verdict for name, judgement in self.verdicts.items()},
-            "reasons": {name: judgement.reason for name, judgement in self.verdicts.items()},
-            "reason": dict(self.reason),
-        }
-
-    def _objects(self) -> dict[str, Any]:
-        """Return objects of single bounds, which are beside ``bounds``."""
-        own = [BOUNDS[name].objects(result, self.measured) for name, result in self.bounds.items()]
-        return {key: value for objects in own for key, value in objects.items()}
+        return self.objects | super().content()
 
 
 def compare(

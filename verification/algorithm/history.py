@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from ndtheory.keys import Part, derived, key, says
 from ndtheory.number import Numeric
 from verification.algorithm.ending import NO_FORCE
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
@@ -26,7 +27,7 @@ from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.runs import Run, check_memory, run_from
 from verification.algorithm.start import LEAST, Start, begin_at, tied_size
 from verification.algorithm.theta import choose
-from verification.bounds.bound import BoundResult, Subject
+from verification.bounds.bound import BY_NAME, BoundResult, Subject
 from verification.bounds.verdicts import Judgement, judge_bound
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
@@ -49,34 +50,36 @@ Method = Literal["iteration", "monolithic"]
 #: Why an increment of the global method has no number of the iteration.
 NO_ITERATION = "the global method solves the increment at once"
 
+#: When an increment has no number of a Jacobian, and the unit of the work of friction.
+NOT_LINEARISED, WORK = "where it was not linearised", "stress · length²"
+
 
 @dataclass(frozen=True, kw_only=True)
-class Promise:
+class Promise(Part):
     """The statement of the theorem on an increment before it is run.
 
-    Attributes
-    ----------
-    load : float
-        Size of the load increment: the energy norm, in the contact body, of the change of the jump ``u_c - P u_n``
-        that the loads would cause without contact forces; square root of energy per unit thickness.
-    residual : float
-        Bound of the first residual: ``sqrt(rho)`` times that size, plus the residual with which the increment before
-        ended; in the norm (5.21).
-    factor : float or None
-        The least proved factor of one step; None where there is none below 1.
-    steps : int or None
-        Number of steps after which the residual is at most the tolerance times the least scale of the run; None without
-        a factor.
+    The load is the energy norm, in the contact body, of the change of the jump ``u_c - P u_n`` that the loads would
+    cause without contact forces.  The bound of the first residual is ``sqrt(rho)`` times that, plus the residual with
+    which the increment before ended.  After so many steps the residual is at most the tolerance times the least scale
+    of the run.
     """
 
-    load: float
-    residual: float
-    factor: float | None
-    steps: int | None
+    load: float = key(
+        "size of the load increment: energy norm, in the contact body, of the change of the jump without contact "
+        "forces",
+        unit="√stress · length",
+    )
+    residual: float = key("bound of the first residual", unit="√stress · length")
+    factor: float | None = key("the least proved factor of one step", null="where none is below 1", why=None)
+    steps: int | None = key("number of steps that suffice", null="without a factor", why=None)
+
+
+def _no_residual(increment: Increment) -> str:
+    return NO_ITERATION if increment.run is None else NO_FORCE
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Increment(Value):
+class Increment(Value, Part):
     """An increment that was computed.
 
     Attributes
@@ -87,30 +90,57 @@ class Increment(Value):
         The run, or the solution of the global method, under the loads at this moment.
     before : ContactFields or None
         Those of the increment before.
-    promise : Promise or None
-        None where ``why_none`` says why.
     verdicts : mapping from the name of a bound to Judgement
-        By the steps of this run; empty with the global method.
+        By the steps of this run.
     """
+
+    part: ClassVar[str] = "Increment"
 
     moment: Moment
     result: Run | Solution
     before: ContactFields | None
-    promise: Promise | None = None
+    promise: Promise | None = key(
+        "what the theorem says in advance",
+        null="where it says nothing, and with the global method",
+        why=lambda increment: increment.why_none,
+        default=None,
+    )
     why_none: str = NO_ITERATION
-    verdicts: Mapping[str, Judgement] = field(default_factory=dict)
+    verdicts: Mapping[str, Judgement] = key(
+        "one for each bound, as in a comparison; none with the global method",
+        of=lambda verdicts: {name: judgement.verdict for name, judgement in verdicts.items()},
+        type="map of text",
+        default_factory=dict,
+    )
 
     @property
+    @says(spread=True)
+    def contact(self) -> ContactFields:
+        """Stresses and motions along Gamma_c at its end."""
+        return self.result.contact
+
+    slip_increment = derived(
+        "the part of `contact.slip` that the increment brought, from which friction is measured",
+        lambda increment: increment.contact.slip_increment,
+        list[float],
+        name="contact.slip_increment",
+        unit="length",
+    )
+
+    @property
+    @says()
     def step(self) -> int:
         """Number of its step, from 1."""
         return self.moment.step
 
     @property
+    @says()
     def name(self) -> str:
         """The name of the step."""
         return self.moment.name
 
     @property
+    @says()
     def time(self) -> float:
         """0 where the history begins, the number of the step at its end."""
         return float(self.moment.time)
@@ -120,13 +150,9 @@ class Increment(Value):
         return f"time {self.time:g} ({self.name}), {self.outcome}, {self.contact.summary}"
 
     @property
-    def contact(self) -> ContactFields:
-        """Stresses and motions along Gamma_c at its end."""
-        return self.result.contact
-
-    @property
+    @says(unit=WORK)
     def dissipated(self) -> float:
-        """Work of friction, by the mean of the shear before and after: energy per unit thickness (in 1D per area)."""
+        """Work of friction in this increment, by the mean of the shear before and after, per unit thickness."""
         shear = self.contact.shear if self.before is None else self.contact.shear + self.before.shear
         return float((self.contact.weights * (0.5 * shear)) @ self.contact.slip_increment)
 
@@ -136,46 +162,37 @@ class Increment(Value):
         return self.result if isinstance(self.result, Run) else None
 
     @property
+    @says()
     def outcome(self) -> str:
-        """The outcome of its run; ``converged`` of the global method, whose solutions are certified."""
+        """Outcome of its run; ``converged`` of the global method, whose solutions are certified."""
         return "converged" if self.run is None else self.run.outcome
 
     @property
+    @says(null="with the global method", why=NO_ITERATION)
     def iterations(self) -> int | None:
-        """Number of steps of its run; None with the global method."""
+        """Number of steps of its run."""
         return None if self.run is None else self.run.iterations
 
     @property
+    @says(null=NOT_LINEARISED, why=None)
     def predicted_steps(self) -> int | None:
-        """Number of steps at the rate of the Jacobian at the solution; None where it was not worked out."""
+        """Number of steps at the rate of the Jacobian at the solution."""
         run = self.run
         if run is None or run.linearised is None:
             return None
         return steps_to(run.iterates[0].residual, run.pair.settings.tolerance * run.last.scale, run.linearised.rate)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return an entry of ``increments`` in ``ndtheory.history/1``."""
-        run, fields = self.run, self.contact.to_dict()
-        fields["contact"]["slip_increment"] = self.contact.slip_increment.tolist()
-        residual = None if run is None else run.coupled_residual
-        none = {"promise": self.why_none} if self.promise is None else {}
-        none |= {"iterations": NO_ITERATION, "coupled_residual": NO_ITERATION} if run is None else {}
-        none |= {"coupled_residual": NO_FORCE} if run is not None and residual is None else {}
-        return {
-            "step": self.step,
-            "name": self.name,
-            "time": self.time,
-            "iterations": self.iterations,
-            "outcome": self.outcome,
-            "coupled_residual": residual,
-            "dissipated": self.dissipated,
-            "predicted_steps": self.predicted_steps,
-            "linearised_rate": None if run is None or run.linearised is None else run.linearised.rate,
-            "promise": None if self.promise is None else vars(self.promise),
-            "verdicts": {name: judgement.verdict for name, judgement in self.verdicts.items()},
-            **fields,
-            "reason": none,
-        }
+    @property
+    @says(null=NOT_LINEARISED, why=None)
+    def linearised_rate(self) -> float | None:
+        """Rate of that Jacobian."""
+        return None if self.run is None or self.run.linearised is None else self.run.linearised.rate
+
+    @property
+    @says(null="with the global method, and without a force", why=_no_residual)
+    def coupled_residual(self) -> float | None:
+        """Coupled residual of its run."""
+        return None if self.run is None else self.run.coupled_residual
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -184,36 +201,46 @@ class History(Document):
 
     Attributes
     ----------
-    problem : Problem
-        With its steps.
-    method : {'iteration', 'monolithic'}
-    increments : tuple of Increment
-    planned : int
-        Number of increments of all steps.
     measured : Measured or None
-        The constants, one set for all increments; None with the global method.
+        The constants; None with the global method.
     bounds : mapping from name to BoundResult
-        The bounds that follow from them, which hold for each increment; empty with the global method.
-    ended : str
-        Why the history ended early; empty where it is whole.
+        The bounds that follow from them, which hold for each increment.
     interrupted : bool
         True if Ctrl-C ended it.
     """
 
     schema: ClassVar[str] = "ndtheory.history/1"
 
-    problem: Problem
-    method: Method
-    increments: tuple[Increment, ...]
-    planned: int
-    measured: Measured | None
-    bounds: Mapping[str, BoundResult]
-    ended: str = ""
+    problem: Problem = key("title of the problem", name="title", of=lambda problem: problem.title, type="text")
+    method: Method = key("`iteration`, or `monolithic`: the global method")
+    increments: tuple[Increment, ...] = key("in their order; there is none at time 0")
+    planned: int = key("number of increments of all steps")
+    measured: Measured | None = key(
+        "one set for all increments", name="constants", null="with the global method", why=NO_ITERATION
+    )
+    bounds: Mapping[str, BoundResult] = key(
+        "of each increment; none with the global method",
+        inside={name: replace(each, absent="with the global method") for name, each in BY_NAME.items()},
+    )
+    ended: str = key("why the history ended early; empty where it is whole", default="")
     interrupted: bool = False
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
         return self.problem.units
+
+    @property
+    @says(null="with the global method", why=NO_ITERATION)
+    def theta(self) -> float | None:
+        """The relaxation factor of every run."""
+        first = self.increments[0].run
+        return None if first is None else float(first.theta)
+
+    @property
+    @says(unit=WORK)
+    def dissipated(self) -> float:
+        """Work of friction in all increments, per unit thickness."""
+        return sum(each.dissipated for each in self.increments)
 
     @property
     def summary(self) -> str:
@@ -232,10 +259,10 @@ class History(Document):
         return not self.ended
 
     @property
+    @says(name="outside_theorem")
     def outside(self) -> list[str]:
-        """The reasons why the theorem does not apply to the increments; empty where it does."""
-        result = self.increments[0].result
-        return result.outside if isinstance(result, Run) else result.bodies.outside
+        """Why the theorem does not apply to the increments; empty where it does."""
+        return self.increments[0].result.outside
 
     @property
     def proved_violated(self) -> bool:
@@ -247,8 +274,12 @@ class History(Document):
         )
 
     @property
+    @says()
     def warnings(self) -> list[str]:
-        """Facts that a user should know before trusting the numbers: of the first increment, and the worst checks."""
+        """What to know before trusting the numbers.
+
+        Of the first increment, and the worst checks.
+        """
         of_checks = ("largest_strain", "penetration_outside")
         worst = [max(self.increments, key=lambda one: getattr(one.result.checks, name) or 0.0) for name in of_checks]
         lines = dict.fromkeys(line for each in (self.increments[0], *worst) for line in each.result.warnings)
@@ -312,23 +343,6 @@ class History(Document):
         is open; ``shear`` against the friction bound at a few increments (``times=[..]`` chooses them).
         """
         return self.drawn(view=view, **options)
-
-    def content(self) -> dict[str, Any]:
-        first = self.increments[0].run
-        return {
-            "title": self.problem.title,
-            "method": self.method,
-            "theta": None if first is None else float(first.theta),
-            "planned": self.planned,
-            "ended": self.ended,
-            "constants": None if self.measured is None else self.measured.content(),
-            "bounds": {name: bound.to_dict() for name, bound in self.bounds.items()},
-            "dissipated": sum(each.dissipated for each in self.increments),
-            "increments": [each.to_dict() for each in self.increments],
-            "outside_theorem": self.outside,
-            "warnings": self.warnings,
-            "reason": dict.fromkeys(("theta", "constants"), NO_ITERATION) if first is None else {},
-        }
 
 
 def steps_to(first: float, last: float, factor: float) -> int | None:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg.lapack import ztrexc
 
 from fem1d2d.mesh import Floats
+from ndtheory.keys import Part, key
 from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
@@ -167,25 +168,13 @@ def linearised_rate(piece: Piece, iterate: Iterate, theta: float, first: Floats 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Forecast:
-    """Prediction of the rest of a run, made half way from the iterates up to there.
+class Forecast(Part):
+    """Prediction of the rest of a run, made half way from the iterates up to there."""
 
-    Attributes
-    ----------
-    made_at_iteration : int
-        The first iteration at which the residual had fallen half way, in decades, to the tolerance.
-    rate : float
-        The rate that the run should show at its end, by the definition of the observed rate.
-    iterations : int
-        Number of iterations after which the run should have converged.
-    tolerance : float
-        Of the relative residual, at convergence.
-    """
-
-    made_at_iteration: int
-    rate: float
-    iterations: int
-    tolerance: float
+    made_at_iteration: int = key("the first one with half the decades to the tolerance behind it")
+    rate: float = key("that the run should show at its end, as `observed_rate` is defined")
+    iterations: int = key("steps to the tolerance")
+    tolerance: float = key("of the relative residual")
 
 
 def forecast(pair: ContactPair, iterates: Sequence[Iterate], theta: float, tolerance: float, most: int) -> Forecast:

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from ndtheory.keys import derived, key, says
 from verification.contact.system import ContactSystem, SolveError
 from verification.dense import STILL
 from verification.document import Document
@@ -31,6 +32,7 @@ from verification.interface.assembly import TwoBodies, discretise
 from verification.interface.body import Body
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
+from verification.interface.interface import Grids
 from verification.interface.pair import ContactPair
 from verification.machine.threads import one_thread
 from verification.problem import Problem, load
@@ -47,26 +49,26 @@ class Solution(Document):
 
     Attributes
     ----------
-    bodies : TwoBodies
     force : array
         lambda: tangential forces on body 2, then compressive normal ones; nodal forces per thickness.
     motion : array
         Coefficients of the rigid motions of body 1, then of body 2, that only contact holds.
-    contact : ContactFields
-    kkt_residual : float
-        Relative, at most 1e-11.
-    linear_solves : int
-        Systems on Gamma_c that Newton's method solved.
     """
 
     schema: ClassVar[str] = "ndtheory.solve/1"
 
-    bodies: TwoBodies
+    bodies: TwoBodies = key("title of the problem", name="title", of=lambda bodies: bodies.problem.title, type="text")
     force: Floats
     motion: Floats
-    contact: ContactFields
-    kkt_residual: float
-    linear_solves: int
+    contact: ContactFields = key(spread=True)
+    kkt_residual: float = key("the largest violation of a contact condition, relative: at most 1e-11")
+    linear_solves: int = key(r"linear systems on $\Gamma_c$")
+
+    grids = derived(
+        r"the grids along $\Gamma_c$",
+        lambda solution: Grids(contact_body=solution.problem.contact_body, **solution.bodies.interface.counts),
+        Grids,
+    )
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
@@ -95,14 +97,22 @@ class Solution(Document):
                 used += k
         return fields[0], fields[1]
 
+    @property
+    @says(name="outside_theorem")
+    def outside(self) -> list[str]:
+        """Why the theorem does not apply to the problem; empty where it does."""
+        return self.bodies.outside
+
     @cached_property
+    @says()
     def checks(self) -> Checks:
         """Checks of the bodies outside Gamma_c, and of their strains."""
         return check_state(self.bodies, lambda: self.displacements, lambda: self.contact)
 
     @property
+    @says()
     def warnings(self) -> list[str]:
-        """Reasons why the numbers may be wrong."""
+        """What to know before trusting the numbers."""
         return [*self.bodies.warnings, *self.contact.warnings(self.units["length"]), *self.checks.warnings]
 
     def plot(self, **options: Any) -> Figure:
@@ -112,18 +122,6 @@ class Solution(Document):
         slip, ``zoom=True`` draws only the part where the bodies touch.
         """
         return self.drawn(**options)
-
-    def content(self) -> dict[str, Any]:
-        return {
-            "title": self.bodies.problem.title,
-            "grids": {"contact_body": self.problem.contact_body, **self.bodies.interface.counts},
-            **self.contact.to_dict(),
-            "kkt_residual": self.kkt_residual,
-            "linear_solves": self.linear_solves,
-            "outside_theorem": self.bodies.outside,
-            "checks": self.checks.to_dict(),
-            "warnings": self.warnings,
-        }
 
 
 def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from ndtheory.keys import Part, key, says
 from verification.algorithm.iterate import Iterate
 from verification.interface.pair import ContactPair
 
@@ -143,7 +144,7 @@ def rate_at_the_end(residuals: Sequence[float], floors: Sequence[float], since: 
 
 
 @dataclass(frozen=True, kw_only=True)
-class StepRatio:
+class StepRatio(Part):
     """The largest Lipschitz quotient of T_theta along a run, with its error.
 
     Consecutive iterates are a pair of Proposition 5.6: ``|||T_theta psi - T_theta psi~||| / |||psi - psi~|||``
@@ -159,10 +160,16 @@ class StepRatio:
         Number of steps it was taken over; 0 where the start is the solution.
     """
 
-    value: float
+    value: float = key("in the norm (5.21)")
     lo: float
     hi: float
     steps: int
+
+    @property
+    @says()
+    def interval(self) -> tuple[float, float]:
+        """Its two ends by rounding."""
+        return self.lo, self.hi
 
 
 def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRatio | None:

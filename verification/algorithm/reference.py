@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import islice
 
+from ndtheory.keys import Part, key
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import rate_of
@@ -22,38 +23,20 @@ MOST_STEPS, MOST_PAIRS = 50, 350_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reference:
+class Reference(Part):
     """A run by cvxpy's own answers beside the run it refers to.
 
-    Attributes
-    ----------
-    steps : int
-        Evaluations of T by the program's own answer.
-    whole : bool
-        Whether the run was repeated; else only its first and last step were.
-    observed_rate : float or None
-        The rate of these steps; None where too few are clear of the program's errors, or the run was not repeated.
-    largest_difference : float
-        The largest ``|||T_cvxpy g - T g|||``, relative to the largest ``|||T g|||`` so far.
-    why : str
-        Why the run was not repeated, or shows no rate; empty where it does.
+    The difference is relative to the largest ``|||T g|||`` so far.  ``why`` says why the run was not repeated, or shows
+    no rate.
     """
 
-    steps: int
-    whole: bool
-    observed_rate: float | None
-    largest_difference: float
+    steps: int = key("how many evaluations of T were repeated")
+    whole: bool = key("whether the whole run was; otherwise only its first and last step were")
+    observed_rate: float | None = key(
+        "the rate that they show", null="where they show none", why=lambda found: found.why
+    )
+    largest_difference: float = key("of both answers for T g in the norm (5.21), relative")
     why: str = ""
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the object ``cvxpy`` of ``ndtheory.compare/1``."""
-        return {
-            "steps": self.steps,
-            "whole": self.whole,
-            "observed_rate": self.observed_rate,
-            "largest_difference": self.largest_difference,
-            "reason": {"observed_rate": self.why} if self.why else {},
-        }
 
 
 def by_cvxpy_alone(run: Run) -> Reference:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from fem1d2d.mesh import Floats
 from ndtheory import Number
+from ndtheory.keys import Key, derived, key, says
 from ndtheory.number import Numeric
 from verification.algorithm.ending import LAST_ITERATE, NO_FORCE, Ending, Outcome, arrived, coupled_residual
 from verification.algorithm.fixed_point import FixedPointMap, iterates
@@ -32,6 +33,7 @@ from verification.interface.assembly import TwoBodies
 from verification.interface.build import pair_of
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
+from verification.interface.interface import Grids
 from verification.interface.pair import ContactPair
 from verification.machine.interrupts import INTERRUPTED
 from verification.machine.threads import one_thread
@@ -46,11 +48,28 @@ R = TypeVar("R")
 #: Why a run is not linearised: that takes longer than the run, and is done only on request.
 NOT_ASKED = "not worked out: linearise() does"
 
-#: The values that a linearisation adds to the document of a run.
-LINEARISED = ("linearised_rate", "linearised_norm", "linearised_radius", "linearised_margin", "predicted_rate")
+#: Why a run shows no rate.
+FEW = "fewer than two step ratios are clear of rounding"
+
+SOLVED = Key(says="how often each solver solved step II", type="integer")
 
 #: Bytes that the iterates of a run may fill, and the measured size of each without its four arrays.
 MOST_BYTES, ITERATE_BYTES = 2_000_000_000, 1600
+
+
+def _no_rate(run: Run) -> str:
+    return "the run diverged: it shows growth, not a rate" if run.outcome == "diverged" else FEW
+
+
+def _of_jacobian(attribute: str, says: str, null: str = "", why: str = "") -> Any:
+    """A value of the linearisation, null where there is none, and where ``null`` says."""
+    return derived(
+        says,
+        lambda run: getattr(run.linearised, attribute, None),
+        float,
+        null=f"where it was not linearised{null}",
+        why=lambda run: why if run.linearised else run.why_not_linearised,
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -63,58 +82,103 @@ class Run(Document):
         The bodies that were run, with the settings that ended the run.
     rule : Rule
         The relaxation rule, which chose each next g.
-    choice : Choice
-        theta and where it comes from.
-    start : Start
-        g_0 and where it comes from.
     iterates : tuple of Iterate
-        At least one; ``iterations``, ``history``, ``observed_rate`` and ``contact`` follow from them.
-    outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
+        At least one.
     interrupted : bool
         True if Ctrl-C ended the run, or what was to be worked out after it: nothing is linearised then.
     linearised : Linearisation or None
         The linearisation at the solution; None where ``why_not_linearised`` says why.
-    forecast : Forecast or None
-        The prediction made half way; None where ``why_no_forecast`` says why.
     """
 
     schema: ClassVar[str] = "ndtheory.run/1"
+    part: ClassVar[str] = "Run"
 
-    pair: ContactPair
+    pair: ContactPair = key("title of the problem", name="title", of=lambda pair: pair.title, type="text")
     rule: Rule
     choice: Choice
-    start: Start
+    start: Start = key(
+        "where the run starts: `zero`, `given`, or `tied`, the solution of the bodies tied together; `reason` says why "
+        "where it is not `zero`",
+        of=lambda start: start.source,
+        type="text",
+    )
     iterates: tuple[Iterate, ...]
-    outcome: Outcome
+    outcome: Outcome = key("`converged`, `stalled`, `limit`, `diverged` or `interrupted`")
     interrupted: bool = False
     linearised: Linearisation | None = None
     why_not_linearised: str = NOT_ASKED
-    forecast: Forecast | None = None
+    forecast: Forecast | None = key(
+        "the prediction of the end by the Jacobian half way",
+        null="where none was asked for or made",
+        why=lambda run: run.why_no_forecast,
+        default=None,
+    )
     why_no_forecast: str = NOT_ASKED
 
+    linearised_rate = _of_jacobian("rate", "spectral radius of the Jacobian at the end, on what the run excites")
+    linearised_norm = _of_jacobian("norm", "norm of that Jacobian")
+    linearised_radius = _of_jacobian("radius", "spectral radius of that Jacobian")
+    linearised_margin = _of_jacobian(
+        "margin",
+        "how far g may move until a node changes its state, relative",
+        ", and where none does",
+        "no change of g changes a state",
+    )
+    predicted_rate = _of_jacobian(
+        "predicted",
+        "the rate that the Jacobian gives for the error of the run, a test of the Jacobian",
+        ", and where the run has no suitable steps",
+        "the run did not end in a stretch of steps without a change of state",
+    )
+    theta_source = derived(
+        "`given`, `proved`, `predicted`, or the rule that takes its own step", lambda run: run.choice.source
+    )
+    theta_reason = derived("why this one", lambda run: run.choice.why)
+    neumann_body = derived("1 or 2", lambda run: run.pair.neumann_body, int)
+    grids = derived(
+        r"the grids along $\Gamma_c$",
+        lambda run: Grids(contact_body=run.pair.contact_body, **run.pair.interface.counts),
+        Grids,
+    )
+    unrelaxed_residual = derived(
+        r"$\lvert\lvert\lvert Tg - g\rvert\rvert\rvert$ over the larger of $\lvert\lvert\lvert g\rvert\rvert\rvert$ "
+        r"and $\lvert\lvert\lvert Tg\rvert\rvert\rvert$",
+        lambda run: run.last.relative_residual,
+        float,
+        null="where it is infinite",
+    )
+    kkt_residual = derived(
+        "the largest violation of a condition of step II, relative", lambda run: run.last.contact.kkt.residual, float
+    )
+
     @property
+    @says(of=float, type="number")
     def theta(self) -> Fraction:
         """The relaxation factor; the step length of the triple momentum method."""
         return self.choice.theta
 
     @property
+    @says()
     def relaxation(self) -> str:
         """The name of the rule."""
         return self.rule.name
 
     @property
+    @says(name="outside_theorem")
     def outside(self) -> list[str]:
-        """The reasons why the theorem does not apply to this run; empty where it does."""
+        """Why the theorem does not apply to the problem; empty where it does."""
         rule = self.rule.outside(self.pair.friction)
         return self.pair.outside + ([rule] if rule else [])
 
     @property
+    @says(null="elsewhere", why="momentum without friction has one; for a constant theta see the bounds")
     def proved_rate(self) -> Number | None:
-        """The proved rate of the rule itself: momentum without friction has one; None otherwise."""
+        """The proved rate of a rule that has one, as momentum without friction."""
         rate = None if self.outside or self.choice.rho is None else self.rule.proved_rate(self.choice.rho)
         return None if rate is None else Number.of_float(rate)
 
     @property
+    @says()
     def converged(self) -> bool:
         """True if the residual fell to the tolerance, relative to the present forces, in a state of contact."""
         return self.outcome == "converged"
@@ -143,10 +207,12 @@ class Run(Document):
         )
 
     @cached_property
+    @says(null="without a force", why=NO_FORCE)
     def coupled_residual(self) -> float | None:
-        """Largest violation of a contact condition by the joined state at the end, relative to its own traction.
+        """Largest violation of a condition of contact by the joined state at the end, relative to its own traction g.
 
-        In the norm (5.21), :func:`verification.algorithm.ending.coupled_residual`; None without a force.
+        Both displacements are joined, with g as the traction between the bodies; in the norm (5.21).  See
+        :func:`verification.algorithm.ending.coupled_residual`.
         """
         return coupled_residual(self.pair, self.last)
 
@@ -156,11 +222,13 @@ class Run(Document):
         return self.iterates[-1]
 
     @property
+    @says()
     def iterations(self) -> int:
         """Relaxations (III) done until the last evaluation of T."""
         return self.last.iteration
 
     @property
+    @says()
     def evaluations(self) -> int:
         """Evaluations of T."""
         return len(self.iterates)
@@ -170,6 +238,9 @@ class Run(Document):
         return observed_rate(self.pair, self.iterates)
 
     @property
+    @says(
+        of=lambda rate: rate.value, type="number", null="where too few steps are clear of rounding errors", why=_no_rate
+    )
     def observed_rate(self) -> ObservedRate | None:
         """Factor of the error per step at the end of the run: ``value``, between ``lo`` and ``hi``.
 
@@ -178,6 +249,13 @@ class Run(Document):
         return None if self.outcome == "diverged" else self._at_the_end
 
     @property
+    @says(null="with it", why=_no_rate)
+    def observed_rate_interval(self) -> tuple[float, float] | None:
+        """Both ends of the observed rate."""
+        return None if self.observed_rate is None else (self.observed_rate.lo, self.observed_rate.hi)
+
+    @property
+    @says(null="elsewhere", why=lambda run: FEW if run.outcome == "diverged" else "the run did not diverge")
     def observed_growth(self) -> float | None:
         """The factor by which the residual of a run that diverged grew in a step at its end; None of any other run."""
         grown = self._at_the_end if self.outcome == "diverged" else None
@@ -214,6 +292,7 @@ class Run(Document):
             return None, str(error)
 
     @cached_property
+    @says(spread=True)
     def contact(self) -> ContactFields:
         """Stresses and motions along Gamma_c at the last iterate."""
         return self.contact_at(self.last)
@@ -253,15 +332,29 @@ class Run(Document):
         return (of_contact, of_neumann) if self.pair.neumann_body == 2 else (of_neumann, of_contact)
 
     @cached_property
+    @says()
     def checks(self) -> Checks:
         """Checks of the bodies outside Gamma_c and of their strains, at the last iterate."""
         why = "the run diverged" if self.outcome == "diverged" else ""
         return check_state(self.pair, lambda: self.displacements, lambda: self.contact, why)
 
     @property
+    @says(inside=dict.fromkeys(("cvxpy", "active_set"), SOLVED))
+    def solves(self) -> dict[str, int]:
+        """Number of times that each solver solved step II."""
+        solvers = [iterate.contact.solver for iterate in self.iterates]
+        return {"cvxpy": solvers.count("cvxpy"), "active_set": solvers.count("active-set")}
+
+    @property
+    @says(type="list of number or null")
     def history(self) -> list[float]:
-        """Relative unrelaxed residual of every evaluation."""
+        """Relative unrelaxed residual of every evaluation; a member is null where it is infinite."""
         return [iterate.relative_residual for iterate in self.iterates]
+
+    @property
+    def reason(self) -> dict[str, str]:
+        """Why the run does not start at zero."""
+        return {"start": self.start.why} if self.start.why else {}
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
@@ -296,8 +389,9 @@ class Run(Document):
         }
 
     @property
+    @says()
     def warnings(self) -> list[str]:
-        """Facts that a user should know before trusting the numbers."""
+        """What to know before trusting the numbers."""
         tied = [self.start.why] if self.start.source == "tied" else []
         state = [*self.contact.warnings(self.units["length"]), *self.checks.warnings] if self.converged else []
         return self.pair.warnings + self.choice.warnings + tied + state
@@ -308,70 +402,6 @@ class Run(Document):
         The bodies take the options of :meth:`verification.Solution.plot`: ``stress="mises"``, ``zoom=True``.
         """
         return self.drawn(view=view, **options)
-
-    def content(self) -> dict[str, Any]:
-        """Return the values of ``ndtheory.run/1``; each null has a reason beside it."""
-        rate = self.observed_rate
-        solvers = [iterate.contact.solver for iterate in self.iterates]
-        linear = self.linearised
-        proved = self.proved_rate
-        reason: dict[str, str] = {"start": self.start.why} if self.start.why else {}
-        if proved is None:
-            reason["proved_rate"] = "momentum without friction has one; for a constant theta see the bounds"
-        linearised: dict[str, float | None] = dict.fromkeys(LINEARISED)
-        if linear is None:
-            reason |= dict.fromkeys(LINEARISED, self.why_not_linearised)
-        else:
-            found = (linear.rate, linear.norm, linear.radius, _finite(linear.margin), linear.predicted)
-            linearised = dict(zip(LINEARISED, found, strict=True))
-            if linear.predicted is None:
-                reason["predicted_rate"] = "the run did not end in a stretch of steps without a change of state"
-            if linearised["linearised_margin"] is None:
-                reason["linearised_margin"] = "no change of g changes a state"
-        if self.coupled_residual is None:
-            reason["coupled_residual"] = NO_FORCE
-        few = "fewer than two step ratios are clear of rounding"
-        if rate is None:
-            why = "the run diverged: it shows growth, not a rate" if self.outcome == "diverged" else few
-            reason |= {"observed_rate": why, "observed_rate_interval": why}
-        if self.observed_growth is None:
-            reason["observed_growth"] = "the run did not diverge" if self.outcome != "diverged" else few
-        if self.forecast is None:
-            reason["forecast"] = self.why_no_forecast
-        return {
-            "title": self.pair.title,
-            "theta": float(self.theta),
-            "theta_source": self.choice.source,
-            "theta_reason": self.choice.why,
-            "relaxation": self.relaxation,
-            "start": self.start.source,
-            "neumann_body": self.pair.neumann_body,
-            "grids": {"contact_body": self.pair.contact_body, **self.pair.interface.counts},
-            "iterations": self.iterations,
-            "evaluations": self.evaluations,
-            "outcome": self.outcome,
-            "converged": self.converged,
-            "proved_rate": None if proved is None else proved.to_dict(),
-            "observed_rate": None if rate is None else rate.value,
-            "observed_rate_interval": None if rate is None else [rate.lo, rate.hi],
-            "observed_growth": self.observed_growth,
-            "forecast": None if self.forecast is None else vars(self.forecast),
-            **linearised,
-            "unrelaxed_residual": _finite(self.last.relative_residual),
-            "coupled_residual": None if self.coupled_residual is None else _finite(self.coupled_residual),
-            "kkt_residual": self.last.contact.kkt.residual,
-            "solves": {"cvxpy": solvers.count("cvxpy"), "active_set": solvers.count("active-set")},
-            **self.contact.to_dict(),
-            "checks": self.checks.to_dict(),
-            "history": [_finite(r) for r in self.history],
-            "outside_theorem": self.outside,
-            "warnings": self.warnings,
-            "reason": reason,
-        }
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 def unwatched(iterate: Iterate) -> None:

@@ -9,17 +9,18 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from heapq import heappop, heappush
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
-from ndtheory.keys import Part, key
+from ndtheory.bounds import FACTOR
+from ndtheory.keys import Key, Part, document, key, plain, says
 from ndtheory.number import Level, Numeric, above, below
 from verification.machine.progress import Progress, silent
-from verification.value import to_plain
 
 if TYPE_CHECKING:
     from verification.constants import Measured
@@ -40,22 +41,31 @@ FIRST = (1.0, 0.75, 0.5, 0.25, 1e-4)
 #: Why a bound that was left out has no result.
 NOT_ASKED = "not asked for"
 
+_where = partial(Key, null="where it was not asked for, or was not worked out")
+
+#: The documents of bounds by name.
+BY_NAME = {
+    "printed": _where(says="the theorem as printed", type="Bound of Section 5"),
+    "repaired": _where(says="the theorem as repaired", type="Bound of Section 5"),
+    "energy": _where(says="the theorem in energy norms", type="Bound in energy norms"),
+    "*": _where(says="a bound of your own that follows from constants", type="Registered bound"),
+}
+
+
+_BELOW = {"null": "where it was not worked out", "why": "not worked out", "default": None}
+
 
 @dataclass(frozen=True, kw_only=True)
-class Thresholds:
-    """Friction that a bound allows.
+class Thresholds(Part):
+    """Friction that a bound allows; without a law of friction it is on ``any``."""
 
-    Attributes
-    ----------
-    every, some : Number or None
-        Below it every small theta contracts, or some theta; None where that was not worked out.
-    on : {'k', 'C_K', 'multiple', 'any'}
-        The bounded quantity; ``multiple``: the given friction may grow by this factor; ``any``: no law of friction.
-    """
-
-    every: Number | None = None
-    some: Number | None = None
-    on: str = "k"
+    every: Number | None = key("friction below which every small theta contracts", name="every_small_theta", **_BELOW)
+    some: Number | None = key("friction below which some theta contracts", name="some_theta", **_BELOW)
+    on: str = key(
+        "what these two bound: `k`, `C_K`, `multiple` (of the friction given) or `any`",
+        name="threshold_on",
+        default="k",
+    )
 
     def over(self, k: Fraction) -> Thresholds:
         """The same on the factor by which a friction k may grow; unchanged if they are not on k."""
@@ -124,39 +134,52 @@ class Subject:
         return Subject.of(self.pair.at(friction=k), self.measured.with_friction(k))
 
 
+def _no_factor(result: BoundResult) -> str:
+    return result.why or "no theta was given"
+
+
+_FACTOR = {"null": "where there is no conclusion", "why": _no_factor, "default": None}
+
+
 @dataclass(frozen=True, kw_only=True)
-class BoundResult:
+class BoundResult(Part):
     """Result of a bound.
 
     Attributes
     ----------
-    name : str
     proved : bool
         True if the result is proved; the printed theorem is, where m >= 1.
-    theta, factor, one_minus_factor : float or None, Number or None
-        At theta no step changes the distance of two forces by more than the factor; None without a conclusion.
-    interval : pair of float or None
-        The thetas that contract.
     interval_level : {'exact', 'verified', 'guaranteed', 'float'}
         Of the interval: at any level but ``float`` each theta in it is proved to contract.
-    friction : Thresholds
     why, not_computed : str
         Why the factor is missing; why nothing was worked out.
     detail : object, optional
-        Full result of this bound beyond these attributes; its ``to_dict`` is the document then.
+        Full result of this bound beyond these attributes, which is the document then.
     """
+
+    part: ClassVar[str] = "Registered bound"
 
     name: str
     proved: bool
-    theta: float | None = None
-    factor: Number | None = None
-    one_minus_factor: Number | None = None
-    interval: tuple[float, float] | None = None
+    theta: float | None = key(
+        "the one of the run", null="where the bound has no conclusion there", why=_no_factor, default=None
+    )
+    factor: Number | None = key(FACTOR, **_FACTOR)
+    one_minus_factor: Number | None = key(FACTOR, **_FACTOR)
+    interval: tuple[float, float] | None = key(
+        "the thetas that contract", null="where there are none", why="not worked out", default=None
+    )
     interval_level: Level = "float"
-    friction: Thresholds = field(default_factory=Thresholds)
+    friction: Thresholds = key(spread=True, default_factory=Thresholds)
     why: str = ""
     not_computed: str = ""
     detail: Any = None
+
+    @property
+    @says(null="without theta", why=_no_factor)
+    def verdict(self) -> str | None:
+        """``contraction`` or ``no conclusion``."""
+        return None if self.theta is None else "contraction" if self.factor is not None else "no conclusion"
 
     @property
     def asked(self) -> bool:
@@ -187,28 +210,12 @@ class BoundResult:
         factor, rest = plain(self.factor), plain(self.one_minus_factor)
         return replace(self, factor=factor, one_minus_factor=rest, interval_level="float", friction=friction)
 
-    def to_dict(self) -> dict[str, Any] | None:
+    def to_dict(self) -> dict[str, Any] | None:  # type: ignore[override]
         """The bound's own document; None where nothing was worked out."""
         if not self.worked_out:
             return None
-        if self.detail is not None:
-            document: dict[str, Any] = self.detail.to_dict()
-            return document
-        concludes = "contraction" if self.factor is not None else "no conclusion"
-        found = {
-            "theta": self.theta,
-            "verdict": None if self.theta is None else concludes,
-            "factor": to_plain(self.factor),
-            "one_minus_factor": to_plain(self.one_minus_factor),
-            "interval": to_plain(self.interval),
-            "every_small_theta": to_plain(self.friction.every),
-            "some_theta": to_plain(self.friction.some),
-            "threshold_on": self.friction.on,
-        }
-        why = dict.fromkeys(found, "not worked out")
-        why |= dict.fromkeys(("factor", "one_minus_factor"), self.why or "no theta was given")
-        why |= dict.fromkeys(("theta", "verdict"), self.why or "no theta was given")
-        return found | {"reason": {name: why[name] for name, value in found.items() if value is None}}
+        found: dict[str, Any] = document(self) if self.detail is None else plain(self.detail)
+        return found
 
 
 @dataclass(frozen=True, kw_only=True)

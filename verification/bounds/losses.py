@@ -3,43 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
+
+from ndtheory.keys import Part, key
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loss:
-    """Loss of one inequality.
+class Loss(Part):
+    """Loss of one inequality, >= 0; of an inequality between squares it counts the squares."""
 
-    Attributes
-    ----------
-    label : str
-        The paper's.
-    decades : float
-        ``log10(right/left)`` at the worst pair, >= 0; of an inequality between squares it counts the squares.
-    searched : bool
-        True if that pair was found by search (the loss may then be smaller), not as an eigenvector.
-    only_unit : bool
-        True if nothing is lost: the effect of a change of the unit of stress.
-    """
+    part: ClassVar[str] = "Loss"
 
-    label: str
-    decades: float
-    searched: bool
-    only_unit: bool = False
+    label: str = key("of the inequality in the paper")
+    decades: float = key(r"$\log_{10}$ of right side over left side at the worst pair")
+    searched: bool = key("whether that pair was found by search, not as an eigenvector; the loss may then be smaller")
+    only_unit: bool = key("whether this loss is due to the unit of stress only", default=False)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Losses:
-    """The losses of each inequality, ``links``, and of two chains, whose steps add up.
+class Losses(Part):
+    """The losses of each inequality, and of two chains whose steps add up; (5.30) is repaired and then printed."""
 
-    ``friction`` leads from the largest friction term found to its bound (5.30), repaired and then printed,
-    ``lipschitz`` from the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to its bound (5.38).
-    """
-
-    links: tuple[Loss, ...]
-    friction: tuple[Loss, ...]
-    lipschitz: tuple[Loss, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``losses`` of ``ndtheory.compare/1``."""
-        return {name: [vars(loss) for loss in losses] for name, losses in vars(self).items()}
+    links: tuple[Loss, ...] = key("each inequality separately")
+    friction: tuple[Loss, ...] = key(
+        "the steps from the largest friction term found to the bound (5.30) of the friction term, which add up"
+    )
+    lipschitz: tuple[Loss, ...] = key(
+        "the steps from the largest Lipschitz quotient of $T$ found to the bound (5.38) of $T$ in the energy norm, "
+        "which add up"
+    )

@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ndtheory import PRINTED, REPAIRED, Constants, EnergyConstants, Number, evaluate, evaluate_energy
+from ndtheory import PRINTED, REPAIRED, Constants, EnergyBounds, EnergyConstants, Number, evaluate, evaluate_energy
 from ndtheory.bounds import Edition
 from ndtheory.constants import relaxation_factor
+from ndtheory.keys import Key, Part, derived, key, says
 from ndtheory.number import Numeric, weakest
 from ndtheory.texts import did_you_mean
-from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds
+from verification.bounds.bound import BY_NAME, Bound, BoundResult, Subject, Thresholds
 from verification.document import Document
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
-from verification.value import to_plain
 
 if TYPE_CHECKING:
     from verification.constants import Measured
 
 #: The constants that may be given to the calculator, for Section 5 and for the theorem in energy norms.
 SECTION_5, ENERGY = ("m", "M", "C_R", "C_s", "C_tr", "k", "C_K"), ("rho", "kappa_1", "kappa_2")
+
+_given = partial(Key, says="as given", type="number")
+
+#: The keys of what was given.
+INPUTS = {
+    **dict.fromkeys(("m", "M", "C_K"), _given(unit="stress", null="where only `--rho` was")),
+    "C_R": _given(null="where only `--rho` was"),
+    **dict.fromkeys(("C_s", "C_tr"), _given(unit="stress/√length, √length", null="where `C_K` or only `--rho` was")),
+    **dict.fromkeys(("k", "theta"), _given(null="where it was not")),
+    **dict.fromkeys(ENERGY, _given(null="without the bound in energy norms")),
+    "reason": Key(says="why an input is null", type="map of text"),
+}
 
 #: Why an edition that its own proof does not cover has no interval: Proposition 5.6 as printed needs the sum.
 NO_SUM = "needed M >= 2 m, as M is the sum of the constants of both bodies (4.2)"
@@ -112,19 +125,40 @@ class Energy(Bound):
 
     def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
         """Its document with both rho and both thresholds on k."""
-        document = result.to_dict()
-        if document is None:
-            return {self.name: None}
-        if measured.friction_threshold is None:
-            document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), measured.why_no_threshold)
-        document |= {
-            "rho": to_plain(measured.rho_max),
-            "rho_normal": to_plain(measured.rho_normal),
-            "rho_at_work": document["rho"],
-            "friction_threshold": to_plain(measured.friction_threshold),
-            "friction_limit": to_plain(measured.friction_limit),
-        }
-        return {self.name: document}
+        found = result.detail
+        return {self.name: None if found is None else EnergyOfPair(found=found, measured=measured).to_dict()}
+
+
+_THRESHOLD: dict[str, Any] = {
+    "hint": Number,
+    "null": "without a law of friction, or where $C_{t1}$ is infinite",
+    "why": lambda of_pair: of_pair.measured.why_no_threshold,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyOfPair(Part):
+    """The bound in energy norms beside the constants of a pair."""
+
+    part: ClassVar[str] = "Measured bound in energy norms"
+
+    found: EnergyBounds
+    measured: Measured
+
+    bound = derived(
+        "except that `rho` is `rho_max` of the constants here",
+        lambda of_pair: replace(of_pair.found, rho=of_pair.measured.rho_max),
+        EnergyBounds,
+        spread=True,
+    )
+    rho_normal = derived("as in the constants", lambda of_pair: of_pair.measured.rho_normal, Number)
+    rho_at_work = derived("the one of the two that enters the bound", lambda of_pair: of_pair.found.rho, Number)
+    friction_threshold = derived(
+        "$k_s$: every small theta contracts below it", lambda of_pair: of_pair.measured.friction_threshold, **_THRESHOLD
+    )
+    friction_limit = derived(
+        "$k_e$: some theta contracts below it", lambda of_pair: of_pair.measured.friction_limit, **_THRESHOLD
+    )
 
 
 def _why_not(
@@ -188,16 +222,20 @@ class Calculated(Document):
     constants: Constants | None
     energy: EnergyConstants | None
     theta: Any
-    results: Mapping[str, BoundResult]
+    results: Mapping[str, BoundResult] = key(name="editions", inside=BY_NAME)
 
-    def content(self) -> dict[str, Any]:
-        given: dict[str, Any] = {key: getattr(self.constants, key, None) for key in SECTION_5}
-        given |= {key: getattr(self.energy, key, None) for key in ENERGY}
+    @property
+    @says(inside=INPUTS)
+    def inputs(self) -> dict[str, Any]:
+        """The constants that were given, and theta."""
+        given: dict[str, Any] = {name: getattr(self.constants, name, None) for name in SECTION_5}
+        given |= {name: getattr(self.energy, name, None) for name in ENERGY}
         given["theta"] = None if self.theta is None else relaxation_factor(self.theta)
-        absent = {key: "not given" for key, value in given.items() if value is None}
-        inputs = {key: None if value is None else float(value) for key, value in given.items()}
-        return {
-            "inputs": inputs | {"reason": absent},
-            "editions": {name: result.to_dict() for name, result in self.results.items()},
-            "reason": {name: result.not_computed for name, result in self.results.items() if result.not_computed},
-        }
+        absent = {name: "not given" for name, value in given.items() if value is None}
+        return {name: None if value is None else float(value) for name, value in given.items()} | {"reason": absent}
+
+    @property
+    @says()
+    def reason(self) -> dict[str, str]:
+        """Why one of `editions` is null."""
+        return {name: result.not_computed for name, result in self.results.items() if result.not_computed}

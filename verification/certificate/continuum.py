@@ -153,7 +153,7 @@ class ContinuumCertificate(Document):
         none = self.constants.reason
         if self.energy is None:
             return none | dict.fromkeys(OF_ENERGY, none.get("rho", ""))
-        none = none | {name: why for name, why in self.energy.reason.items() if name in OF_ENERGY}
+        none = none | {name: why for name, why in self.energy.to_dict()["reason"].items() if name in OF_ENERGY}
         return none if self.friction_limit else none | {"friction_limit": "no friction"}
 
     @property

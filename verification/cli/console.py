@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TextIO, TypeVar
 
 import click
 
+from ndtheory.keys import key
 from ndtheory.texts import printable
 from verification.document import Document
 from verification.machine.interrupts import undisturbed
@@ -316,24 +317,23 @@ def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[Iterate], N
 PROBLEM = "ndtheory.problem"
 
 
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Failure(Document):
     """The document of a command that ends without a result: a solver failed, or nothing was proved."""
 
     schema: ClassVar[str] = "ndtheory.failure/1"
 
-    def __init__(self, *, command: str, outcome: str, file: str | None, error: str, problem: Problem | None) -> None:
-        self.command, self.outcome, self.file, self.error, self.problem = command, outcome, file, error, problem
-        self.units: Mapping[str, str] = {"length": "any", "stress": "any"} if problem is None else problem.units
+    command: str = key("name of the command")
+    outcome: str = key("`error`: a solver found no solution; `not proved`: contraction may hold or not")
+    file: str | None = key(
+        "the file that the command was given", null="where it was given none", why="the command was given none"
+    )
+    error: str = key("what happened")
+    problem: Problem | None
 
-    def content(self) -> dict[str, Any]:
-        reason = {} if self.file is not None else {"file": "the command was given none"}
-        return {
-            "command": self.command,
-            "outcome": self.outcome,
-            "file": self.file,
-            "error": self.error,
-            "reason": reason,
-        }
+    @property
+    def units(self) -> Mapping[str, str]:  # type: ignore[override]
+        return {"length": "any", "stress": "any"} if self.problem is None else self.problem.units
 
 
 def remember(problem: Problem) -> Problem:

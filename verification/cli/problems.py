@@ -7,15 +7,17 @@ import shutil
 import sys
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
 
+from ndtheory.keys import key
 from verification.cli.console import Interrupted, complain, deliver, one_by_one, progress, remember, say, stages
 from verification.cli.options import FILE, FOLDER, JSON, SET, SWAP, Typed, folder_name, of_a_run
+from verification.document import Document
 
 if TYPE_CHECKING:
     from verification.algorithm.runs import Run
@@ -28,6 +30,23 @@ def examples() -> dict[str, str]:
     from verification.problem.examples import examples as built_in
 
     return built_in()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Examples(Document):
+    """The built-in problem files: their titles, or one of them, or what files were written."""
+
+    schema: ClassVar[str] = "ndtheory.examples/1"
+    units: ClassVar[Mapping[str, str]] = {"length": "see each file", "stress": "see each file"}  # type: ignore[misc]
+
+    examples: Mapping[str, str] | None = key(
+        "titles by name", absent="where one was named, and with --inputs", default=None
+    )
+    name: str | None = key("the example that was named", absent="where none was", default=None)
+    toml: str | None = key("its text", absent="where none was named", default=None)
+    written: Mapping[str, str] | None = key(
+        "what the files of --inputs hold, by their paths", absent="without --inputs", default=None
+    )
 
 
 def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
@@ -51,8 +70,6 @@ def example(name: str | None, inputs: Path | None, as_json: bool) -> None:
       ndtheory example section6 > my.toml
       ndtheory example --inputs trial
     """
-    from verification.document import Document
-
     written: Mapping[str, str] = {}
     if inputs is not None:
         if name is not None:
@@ -70,17 +87,8 @@ def example(name: str | None, inputs: Path | None, as_json: bool) -> None:
         raise click.UsageError(unknown_example(name, available), click.get_current_context())
     titles = {key: _title(text) for key, text in available.items()}
     if as_json:
-
-        class Examples(Document):
-            schema = "ndtheory.examples/1"
-            units = {"length": "see each file", "stress": "see each file"}
-
-            def content(self) -> dict[str, Any]:
-                if written:
-                    return {"written": written}
-                return {"examples": titles} if name is None else {"name": name, "toml": available[name]}
-
-        say(Examples().to_json())
+        listed = Examples(examples=titles) if name is None else Examples(name=name, toml=available[name])
+        say((Examples(written=written) if written else listed).to_json())
     elif written:
         for file, what in written.items():
             say(f"{file}: {what}")

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number, evaluate_energy, exact
 from ndtheory.energy_norms import friction_multiple
+from ndtheory.keys import ABSENT, Part, key, says
 from ndtheory.number import above, below, weakest
 from verification.constants import cells
 from verification.document import Document
 from verification.problem import Problem
-from verification.value import to_plain
 
 #: Why no friction is the largest one.
 NO_LAW = "no law of friction"
@@ -37,97 +37,95 @@ FROM_MATRICES = "the pair is made from matrices: needed the meshes of both bodie
 
 
 @dataclass(frozen=True, kw_only=True)
-class BodyConstants:
-    """Coercivity m^a and continuity M^a of one body (4.1), unit stress; m^a is exactly 0 if the body can move rigidly.
+class BodyConstants(Part):
+    """Coercivity m^a and continuity M^a of one body (4.1).
 
     ``residual_m``, ``residual_M`` are relative residuals of the eigenvalues, whose errors are of the order of their
     squares.
     """
 
-    m: Number
-    M: Number
-    nodes: int
+    part: ClassVar[str] = "Body constants"
+
+    m: Number = key("coercivity on the mesh; 0, exactly, where the body can move rigidly", unit="stress")
+    M: Number = key("continuity on the mesh", unit="stress")
+    nodes: int = key("of its mesh")
     residual_m: float
     residual_M: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """The objects ``body1``, ``body2`` of the document."""
-        return {"m": self.m.to_dict(), "M": self.M.to_dict(), "nodes": self.nodes}
+
+_RHO_CELLS = says(
+    r"$\rho^*$, $\rho_N^*$: `rho_max` and `rho_normal` of half-planes of the file's cells once halved, the largest "
+    "over all waves along Gamma_c and the limit of long ones ({doc}`mesh_spectrum`)",
+    null="in 1D, for a pair made from matrices, bodies that are no rectangles or held along Gamma_c, and where the "
+    "lengths of cells have no ratio of numbers up to 4",
+    why=lambda measured: measured.why_no_cells,
+)
+
+MATRICES, FRICTIONLESS = "of a pair made from matrices", "without a law of friction"
+APART = "where they hold different components"
+KAPPA = "$k C_s C_{t1}$ and $k C_s C_{t2}$ with the largest $k$"
+NO_KAPPA = f"{APART}, and with friction where $C_{{t1}}$ is infinite"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Measured(Document):
     """The constants of a problem on its mesh; on this mesh they are exact up to rounding.
 
-    On a mesh m is above and M below its continuous value: for the continuous theorem both err on the unsafe side.
-
-    Attributes
-    ----------
-    body1, body2 : BodyConstants or None
-        None, as m and M, where only matrices are known.
-    m, M : Number or None
-        Smallest m^a, 0 where contact alone holds the contact body; sum of the M^a (4.2); stress.
-    C_R : Number or None
-        Lift constant, the safe maximum over both bodies' H^1/2 norms; dimensionless.
-    C_s, C_tr : Number or None
-        Into L2(Gamma_c), as (5.13) uses them.
-    C_tr_half : Number or None
-        The tangential trace into H^1/2(Gamma_c), as (5.8) prints it.
-    C_K : Number or None
-        ``k C_s C_tr``; stress.
-    rho_max, rho_min : Number or None
-        Extremal eigenvalues of (S of the contact body, S of the Neumann body).
-    rho_normal : Number or None
-        The largest with the tangential components condensed out.
-    C_s_energy : Number or None
-        ``sup |S sigma_N(w)|_L2 / |w|_a2`` over a2-harmonic w, a2 being the Neumann body's; sqrt(stress/length).
-    C_t1, C_t2 : Number or None
-        ``sup |v_T|_L2 / |v|_aa`` of the contact body and of the Neumann body; sqrt(length/stress).
-    kappa_1, kappa_2 : Number or None
-        ``k C_s C_t1`` and ``k C_s C_t2`` of the theorem in energy norms; dimensionless.
-    friction : float
-        k, the largest one where it varies along Gamma_c; S is then ``k(s) S / max k`` in all constants.
-    interface_nodes : int
-    reason : mapping
-        Why a value is None.
-    rho_cells, rho_normal_cells : Number or None
-        rho and rho_normal of half-planes of the file's cells, once halved: what short waves on such meshes have,
-        however fine they are.  Computed when first asked for; None where the cells are not equal or their lengths have
-        no simple ratio, and :attr:`why_no_cells` says why.
-    units : mapping
-        Labels ``length`` and ``stress``.
-    levels : tuple of Measured
-        The same on meshes halved 0, 1, .. times, where that was asked for.
-    problem : Problem or None
-        What was measured.
-    unverified : mapping or None
-        Where proved bounds were asked for: why a number has none.
+    On a mesh m is above and M below its continuous value: for the continuous theorem both err on the unsafe side.  C_R
+    is the safe maximum over both bodies' H^1/2 norms.  Where friction varies along Gamma_c, k is the largest one and S
+    stands for ``k(s) S / max k`` in all constants.  C_s in energy norms is ``sup |S sigma_N(w)|_L2 / |w|_a2`` over
+    a2-harmonic w, a2 being the Neumann body's; C_t1 and C_t2 are ``sup |v_T|_L2 / |v|_aa``.
     """
 
     schema: ClassVar[str] = "ndtheory.constants/1"
+    part: ClassVar[str] = "Constants"
 
-    body1: BodyConstants | None
-    body2: BodyConstants | None
-    m: Number | None
-    M: Number | None
-    C_R: Number | None
-    C_s: Number | None
-    C_tr: Number | None
-    C_tr_half: Number | None
-    C_K: Number | None
-    rho_max: Number | None
-    rho_min: Number | None
-    rho_normal: Number | None
-    C_s_energy: Number | None
-    C_t1: Number | None
-    C_t2: Number | None
-    kappa_1: Number | None
-    kappa_2: Number | None
+    body1: BodyConstants | None = key(null=MATRICES)
+    body2: BodyConstants | None = key(null=MATRICES)
+    m: Number | None = key(
+        "the smaller coercivity, 0 where only contact holds the contact body", unit="stress", null=MATRICES
+    )
+    M: Number | None = key("the sum of the continuity constants (4.2)", unit="stress", null=MATRICES)
+    C_R: Number | None = key("lift constant", null=MATRICES)
+    C_s: Number | None = key(
+        r"of $S\sigma_N$ into $L^2(\Gamma_c)$ (5.13), of $k_jS\sigma_N/\max k$ where k varies",
+        unit="stress/√length",
+        null=FRICTIONLESS,
+    )
+    C_tr: Number | None = key(r"of the tangential trace into $L^2(\Gamma_c)$ (5.13)", unit="√length", null=MATRICES)
+    C_tr_half: Number | None = key(r"the same into $H^{1/2}(\Gamma_c)$, as (5.8) prints it", null=MATRICES)
+    C_K: Number | None = key("$k C_s C_{tr}$", unit="stress", null=MATRICES)
+    rho_max: Number | None = key(
+        r"$\rho$: the largest ratio of the stiffness of the contact body to the stiffness of the Neumann body",
+        null=APART,
+    )
+    rho_min: Number | None = key(
+        "the smallest such ratio; 0 where the Neumann grid has more nodes than the contact grid, or only contact holds "
+        "the contact body"
+    )
+    rho_normal: Number | None = key("the largest without tangential forces", null=APART)
+    C_s_energy: Number | None = key("`C_s` in energy norms", unit="√(stress/length)", null=FRICTIONLESS)
+    C_t1: Number | None = key(
+        "of the tangential trace of the contact body in energy norms",
+        unit="√(length/stress)",
+        null=f"{APART}, also where it is infinite: only contact holds the contact body, and a rigid motion of it is "
+        r"tangential on $\Gamma_c$",
+    )
+    C_t2: Number | None = key(
+        "of the tangential trace of the Neumann body in energy norms", unit="√(length/stress)", null=APART
+    )
+    kappa_1: Number | None = key(KAPPA, null=NO_KAPPA)
+    kappa_2: Number | None = key(KAPPA, null=NO_KAPPA)
     friction: float
-    interface_nodes: int
+    interface_nodes: int = key("contact nodes")
     reason: Mapping[str, str]
     units: Mapping[str, str]
-    levels: tuple[Measured, ...] = ()
+    levels: tuple[Measured, ...] = key(
+        "the same on meshes halved 0, 1, .. times",
+        absent="without `--refine`",
+        of=lambda levels: levels or ABSENT,
+        default=(),
+    )
     problem: Problem | None = None
     unverified: Mapping[str, str] | None = None
 
@@ -146,11 +144,13 @@ class Measured(Document):
         return cells.rho_of_cells(self.problem, verified=self.unverified is not None)
 
     @property
+    @_RHO_CELLS
     def rho_cells(self) -> Number | None:
         """The largest ratio of stiffness of waves on half-planes of these cells."""
         return self._of_cells.numbers.get("rho_cells")
 
     @property
+    @_RHO_CELLS
     def rho_normal_cells(self) -> Number | None:
         """The same with the tangential components condensed out."""
         return self._of_cells.numbers.get("rho_normal_cells")
@@ -248,24 +248,14 @@ class Measured(Document):
             values |= {"kappa_1": product(exact(k), c_s, C_t1), "kappa_2": product(exact(k), c_s, C_t2)}
         return replace(self, friction=k, problem=None, **values)
 
-    def content(self) -> dict[str, Any]:
-        of_cells, no_cells = self._of_cells.objects()
-        unproved = [name for name, number in self._of_cells.numbers.items() if number.level == "float"]
-        return {
-            "body1": to_plain(self.body1),
-            "body2": to_plain(self.body2),
-            **{name: to_plain(getattr(self, name)) for name in NAMES},
-            **of_cells,
-            **{name: to_plain(getattr(self, name)) for name in ENERGY_NAMES},
-            "interface_nodes": self.interface_nodes,
-            "reason": dict(self.reason) | no_cells,
-            **(
-                {}
-                if self.unverified is None
-                else {"unverified": dict(self.unverified) | dict.fromkeys(unproved, self._of_cells.unverified)}
-            ),
-            **({"levels": [level.content() for level in self.levels]} if self.levels else {}),
-        }
+    @property
+    @says(name="unverified", absent="without `--verified`")
+    def not_proved(self) -> dict[str, str] | None:
+        """Why a constant has no proved bounds."""
+        if self.unverified is None:
+            return None
+        of_cells = [name for name, number in self._of_cells.numbers.items() if number.level == "float"]
+        return dict(self.unverified) | dict.fromkeys(of_cells, self._of_cells.unverified)
 
 
 def product(k: Fraction, a: Number, b: Number) -> Number:

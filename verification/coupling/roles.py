@@ -236,7 +236,7 @@ def role_of(
         theta, rate = bounds.theta_predicted, bounds.rate_predicted
         if not nothing:
             proved = {name: getattr(bounds, name) for name in PROVED}
-            because = {name: why for name, why in bounds.reason.items() if name in PROVED}
+            because = {name: why for name, why in bounds.to_dict()["reason"].items() if name in PROVED}
     if threshold is None:
         because["friction_threshold"] = no_threshold or nothing
     return Role(

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import permutations
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
 from fem1d2d import Mesh, depths, largest_strains, rectangle, surface
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
+from ndtheory.keys import Part, key
 from verification.interface.assembly import TwoBodies
 from verification.interface.body import Body
 from verification.interface.fields import ContactFields
@@ -35,28 +36,43 @@ Place = tuple[float, ...]
 Displacements = Sequence[Floats | None]
 
 
+def _whose(measure: str, otherwise: str) -> Callable[[Checks], str]:
+    """Why a place is null: as its measure is, or otherwise."""
+    return lambda checks: checks.reason.get(measure, otherwise)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Checks(Value):
-    """Two measures of a deformed state, and where they are largest.
+class Checks(Value, Part):
+    """Two measures of a deformed state, and where they are largest; ``reason`` says why a measure is None."""
 
-    Attributes
-    ----------
-    penetration_outside : float or None
-        Greatest depth of a surface node outside Gamma_c inside the other body, unit of length; 0 where none is inside.
-    penetration_at : tuple of float or None
-        Position of that node as it is drawn; None where none is inside.
-    largest_strain : float or None
-        Largest absolute principal strain over the elements.
-    strain_at : tuple of float or None
-        Centre of that element as it is drawn.
-    reason : mapping of str
-        Why a measure is None.
-    """
+    part: ClassVar[str] = "Checks"
 
-    penetration_outside: float | None = None
-    penetration_at: Place | None = None
-    largest_strain: float | None = None
-    strain_at: Place | None = None
+    penetration_outside: float | None = key(
+        r"greatest depth of a surface node outside $\Gamma_c$ inside the other body, in the deformed state; 0 where "
+        "none is inside",
+        unit="length",
+        null="in 1D, for matrices and where the run diverged",
+        default=None,
+    )
+    penetration_at: Place | None = key(
+        "where that node is drawn",
+        unit="length",
+        null="where none is inside",
+        why=_whose("penetration_outside", "no node lies inside the other body"),
+        default=None,
+    )
+    largest_strain: float | None = key(
+        "largest absolute principal strain over the elements",
+        null="for matrices and where the run diverged",
+        default=None,
+    )
+    strain_at: Place | None = key(
+        "centre of that element as it is drawn",
+        unit="length",
+        null="with it, and where nothing is strained",
+        why=_whose("largest_strain", "nothing is strained"),
+        default=None,
+    )
     reason: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
@@ -68,21 +84,6 @@ class Checks(Value):
     def without(cls, why: str) -> Checks:
         """Return no measures, for one reason."""
         return cls(reason=dict.fromkeys(("penetration_outside", "largest_strain"), why))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the object ``checks`` of runs and solutions."""
-        place = lambda at: None if at is None else list(at)
-        places = {
-            "penetration_at": self.reason.get("penetration_outside", "no node lies inside the other body"),
-            "strain_at": self.reason.get("largest_strain", "nothing is strained"),
-        }
-        return {
-            "penetration_outside": self.penetration_outside,
-            "penetration_at": place(self.penetration_at),
-            "largest_strain": self.largest_strain,
-            "strain_at": place(self.strain_at),
-            "reason": dict(self.reason) | {name: why for name, why in places.items() if getattr(self, name) is None},
-        }
 
 
 def check_state(

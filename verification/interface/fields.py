@@ -3,62 +3,79 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from ndtheory.keys import ABSENT, Key, Part, document, key, says
 from verification.contact.active_set import Pattern
 from verification.interface.interface import Interface, Stretch
-from verification.value import Value
+from verification.value import Value, copied, lent
+
+STATES = ("stick", "slip", "open")
+
+#: Keys of the total forces of all contacts, and of each of several.
+OF_FORCE = Key(
+    says="totals, the tangential one on body 2; of several contacts the sums of `forces`, which act on no single body",
+    unit="stress · length",
+    type="number",
+)
+OF_FORCES = {
+    "bodies": Key(says="numbers of its bodies", type="list of integer"),
+    **dict.fromkeys(
+        ("normal", "tangential"), replace(OF_FORCE, says="totals, the tangential one on the second of them")
+    ),
+    "vector": Key(
+        says="the total force on the second of them along x and y", unit="stress · length", type="list of number"
+    ),
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ContactFields(Value):
-    """Stresses and motions along Gamma_c, in the direction of s.
+class ContactFields(Value, Part):
+    """Stresses and motions along Gamma_c, in the direction of s: arrays of n contact nodes.
 
-    Attributes
-    ----------
-    x : array, shape (n,)
-        Position before deformation along the x axis, unit of length.
-    s : array, shape (n,)
-        Distance along Gamma_c from its first node.
-    y : array, shape (n,), or None
-        Position along the y axis; None in 1D and where only matrices are known.
-    normal : array, shape (n, 2), or None
-        Unit normals from body 1 to body 2; None in 1D.
-    weights : array, shape (n,)
-        w_j, unit of length; 1 in 1D.
-    pressure : array
-        ``-sigma_N >= 0``: nodal force over w_j, unit of stress.
-    shear : array
-        Tangential force on body 2 over w_j, unit of stress; 0 in 1D.
-    bound : array
-        Friction bound ``k |S sigma_N|``, unit of stress; 0 in 1D.  In a run it belongs to the g before step II.
-    gap : array
-        Distance of the bodies, >= 0, unit of length.
-    slip : array
-        ``u1_T - u2_T``, unit of length; 0 in 1D.
-    slip_increment : array
-        The part of it that the load increment brought: all of it unless the interface has slipped before.
-    status : tuple of {'stick', 'slip', 'open'}
-        A node that touches and whose friction bound is zero slips.
-    lines : tuple of Stretch
-        The lines of more than two bodies, one after the other; empty for two bodies.  Of each, ``s`` begins at 0.
+    In 1D ``weights`` are 1, and shear, bound and slip are 0.  In a run the friction bound belongs to the g before step
+    II.  ``slip_increment`` is all of the slip unless the interface has slipped before.  A node that touches and whose
+    friction bound is zero slips.  ``lines`` are those of more than two bodies, one after the other, empty for two
+    bodies; of each, ``s`` begins at 0.
     """
 
-    x: Floats
-    s: Floats
+    part: ClassVar[str] = "Fields"
+
+    x: Floats = key("before deformation", name="contact.x", unit="length")
+    y: Floats | None = key(
+        "before deformation, on the contact body",
+        name="contact.y",
+        unit="length",
+        null="in 1D and of a pair made from matrices",
+        why=None,
+        default=None,
+    )
+    s: Floats = key(
+        r"distance along $\Gamma_c$ from its first node, on the contact body", name="contact.s", unit="length"
+    )
+    normal: Floats | None = key(
+        "unit normals from body 1 to body 2",
+        name="contact.normal",
+        type="list of list of number",
+        null="in 1D",
+        why=None,
+        default=None,
+    )
     weights: Floats
-    pressure: Floats
-    shear: Floats
-    bound: Floats
-    gap: Floats
-    slip: Floats
+    pressure: Floats = key(r"$-\sigma_N \ge 0$", name="contact.pressure", unit="stress")
+    shear: Floats = key("tangential stress on body 2", name="contact.shear", unit="stress")
+    bound: Floats = key(
+        r"friction bound $k_j\lvert S\sigma_N\rvert$, of a run with the forces that step II was given; 0 in 1D",
+        name="contact.bound",
+        unit="stress",
+    )
+    gap: Floats = key("distance of the bodies", name="contact.gap", unit="length")
+    slip: Floats = key("$u^1_T - u^2_T$, since the drawn state", name="contact.slip", unit="length")
     slip_increment: Floats
-    status: tuple[str, ...]
-    y: Floats | None = None
-    normal: Floats | None = None
+    status: tuple[str, ...] = key("`stick`, `slip` or `open`; `contact.status` in Python", name="contact.state")
     lines: tuple[Stretch, ...] = ()
 
     @property
@@ -114,7 +131,7 @@ class ContactFields(Value):
                 arrays["s"][line.contact] = self.s[line.contact][-1] - arrays["s"][line.contact]
         arrays["normal"] = np.where(turned[:, None], -arrays["normal"], arrays["normal"]) + 0.0
         lines = tuple(replace(line, flipped=False) for line in self.lines)
-        return replace(self, **arrays, status=tuple(self.status[i] for i in order), lines=lines)
+        return copied(self, **arrays, status=tuple(self.status[i] for i in order), lines=lines)
 
     def unrolled(self) -> ContactFields:
         """Return the fields with s in place of x; several lines follow each other, with NaN between them."""
@@ -140,9 +157,10 @@ class ContactFields(Value):
         return replace(self, **arrays, status=status, lines=())
 
     @property
+    @says(inside=dict.fromkeys(STATES, Key(says="number of nodes in each state", type="integer")))
     def pattern(self) -> dict[str, int]:
         """Number of nodes that stick, slip and are open."""
-        return {name: self.status.count(name) for name in ("stick", "slip", "open")}
+        return {name: self.status.count(name) for name in STATES}
 
     @property
     def apart(self) -> bool:
@@ -154,12 +172,29 @@ class ContactFields(Value):
         far = f"the bodies stay apart along Gamma_c, by at least {float(self.gap.min()):.3g} {length}"
         return [f"nothing touches: {far}"] if self.apart else []
 
-    @property
+    @lent
+    @says(inside=dict.fromkeys(("normal", "tangential"), OF_FORCE))
     def force(self) -> dict[str, float]:
         """Total normal (compressive) and tangential (on body 2) force per unit thickness."""
         return {"normal": float(self.pressure @ self.weights), "tangential": float(self.shear @ self.weights)}
 
     @property
+    @says(
+        "the total force on body 2 along x and y, in 1D along x; the sum of `forces` where there are some",
+        name="force.vector",
+        unit="stress · length",
+    )
+    def vector(self) -> Floats:
+        """Total force on body 2 along the axes."""
+        return self.weights @ self.tractions
+
+    @lent
+    @says(
+        "totals of each of several contacts",
+        absent="of two bodies",
+        inside=OF_FORCES,
+        of=lambda forces: forces or ABSENT,
+    )
     def forces(self) -> list[dict[str, Any]]:
         """Total force of each of several lines, with its bodies: ``vector`` acts on the second of them."""
         found = []
@@ -183,24 +218,21 @@ class ContactFields(Value):
         names = ("x", *(() if self.y is None else ("y",)), "s", "weights", "pressure", "shear", "bound", "gap", "slip")
         own = self.in_order()
         lists = {name: getattr(own, name).tolist() for name in names} | {"status": list(own.status)}
-        return lists | ({"interface": self._interface()} if self.lines else {})
+        return lists | ({} if self.interface is None else {"interface": self.interface})
 
-    def _interface(self) -> list[int]:
-        """Return the number of the line of each node, from 0."""
-        return [i for i, line in enumerate(self.lines) for _ in range(line.contact.start, line.contact.stop)]
+    @property
+    @says(name="contact.interface", absent="of two bodies")
+    def interface(self) -> list[int] | None:
+        """The number of the contact in the file, from 0."""
+        return [i for i, line in enumerate(self.lines) for _ in range(line.contact.start, line.contact.stop)] or None
+
+    @property
+    @says(name="contact.reason", absent="where none is")
+    def missing(self) -> dict[str, str] | None:
+        """Why a key of `contact` is null."""
+        why = "bars meet at a point" if self.normal is None else "the pair is made from matrices, without meshes"
+        return {name: why for name in ("y", "normal") if getattr(self, name) is None} or None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""
-        names = ("x", "y", "s", "normal", "pressure", "shear", "bound", "gap", "slip")
-        own = self.in_order()
-        arrays = {name: getattr(own, name) for name in names}
-        why = "bars meet at a point" if self.normal is None else "the pair is made from matrices, without meshes"
-        missing = {name: why for name, values in arrays.items() if values is None}
-        lists = {name: None if values is None else values.tolist() for name, values in arrays.items()}
-        each = {"interface": self._interface()} if self.lines else {}
-        return {
-            "force": {**self.force, "vector": (own.weights @ own.tractions).tolist()},
-            **({"forces": self.forces} if self.lines else {}),
-            "pattern": self.pattern,
-            "contact": {**lists, "state": list(own.status), **each, **({"reason": missing} if missing else {})},
-        }
+        """The objects ``force``, ``pattern`` and ``contact`` of runs and solutions, lines as the file has them."""
+        return document(self.in_order())

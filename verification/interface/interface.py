@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
 from fem1d2d.trace import SAME
+from ndtheory.keys import Part, key
 from verification.interface.join import ONE_GRID, Held, Join, joined
 from verification.interface.matrices import real_array
 from verification.problem.specs import Profile
@@ -27,6 +28,20 @@ Support = tuple[Nodes, Nodes] | None
 
 #: What holds bodies whose supports are not known.
 NO_SUPPORT: tuple[Support, Support] = (None, None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grids(Part):
+    """The grids along Gamma_c in documents."""
+
+    part: ClassVar[str] = "Grids"
+
+    contact_body: int = key("1 or 2: the body that carries the contact grid")
+    contact_nodes: int = key(r"its nodes on $\Gamma_c$, to which pattern, pressure and the friction bound belong")
+    neumann_nodes: int = key(
+        "the nodes of the other body, to which the forces g belong; where the grids differ, also the nodes beyond an "
+        r"end of $\Gamma_c$ whose hat functions extend onto it"
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -15,12 +15,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import count
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ndtheory import Number
+from ndtheory.keys import Part, key, says
 from ndtheory.number import above, below
 from verification.algorithm.affine_piece import Piece
 from verification.certificate.claims import Confirmation, NoCertificate
@@ -33,7 +34,7 @@ from verification.semidefinite.interior_point import LMIError, Optimum, Stop, We
 from verification.semidefinite.mirror import Mirror
 from verification.semidefinite.multipliers import Certified, QuadraticForms, friction_threshold
 from verification.semidefinite.pattern_search import factor_search
-from verification.value import freeze, to_plain
+from verification.value import freeze
 
 #: The search ends where the upper bound exceeds the lower by this share.
 GAP = 1e-2
@@ -274,59 +275,72 @@ def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[
 
 
 @dataclass(frozen=True, kw_only=True)
-class Semidefinite:
+class Semidefinite(Part):
     """Result of the semidefinite bound for a pair of bodies at one theta.
 
     Attributes
     ----------
     lipschitz : Number
-        A Lipschitz constant of T_theta in the norm (5.21), checked in doubles with a bound on their rounding.
-    lower : float
-        The largest factor found, of an affine piece of T_theta that some loads and gaps bring about.
-    programs : int
-        Number of programs that brought both so close.
-    theta_max : Number or None
-        Every smaller theta contracts; None where none is proved to.
-    friction_threshold, no_threshold : Number or None, str
-        Every small theta contracts below it; why there is none, as without a law of friction.
+        In the norm (5.21), checked in doubles with a bound on their rounding.
     gave_up : str
         Why the solver proposed no multipliers at this theta, so that ``lipschitz`` comes from the known ones.
     whole, divided : Certified or None, Number or None
         The proof of one program for all pieces of T together, and the smaller ``lipschitz`` in doubles, beside a proved
-        one, that dividing the pieces gives.
+        one.
     largest : tuple of arrays
         The multipliers behind ``theta_max``, over theta.
-    not_proved, unverified : str, mapping or None
-        Why ``lipschitz`` is not proved; why ``theta_max`` or ``friction_threshold`` is not, None where that was not
-        tried.
+    not_proved : str
+        Why ``lipschitz`` is not proved.
     """
 
-    lipschitz: Number
-    lower: float
-    programs: int
-    theta_max: Number | None
-    friction_threshold: Number | None
+    part: ClassVar[str] = "Semidefinite bound"
+
+    lipschitz: Number = key("the Lipschitz constant that the program bounds, also above 1")
+    lower: float = key("the largest factor found; it occurs for some loads and gaps")
+    programs: int = key("number of semidefinite programs that were solved for both")
+    theta_max: Number | None = key(
+        "every smaller theta contracts; with `--verified` every theta up to `lo` is proved to",
+        null="where none is found to",
+        why="no theta is proved to contract at this friction",
+    )
+    friction_threshold: Number | None = key(
+        "friction below which every small theta contracts, with `--verified` proved up to `lo`",
+        null="without a law of friction, or where $C_{t1}$ is infinite",
+        why=lambda found: found.no_threshold,
+    )
     gave_up: str = ""
     no_threshold: str = "no law of friction"
     whole: Certified | None = None
-    divided: Number | None = None
+    divided: Number | None = key(
+        "the smaller value that results from dividing the pieces of $T$ into groups, in doubles",
+        absent="unless `certified`",
+        default=None,
+    )
     largest: Weights = ()
     not_proved: str = NOT_CERTIFIED
-    unverified: Mapping[str, str] | None = None
+    unverified: Mapping[str, str] | None = key(
+        "why `theta_max` or `friction_threshold` is not proved", absent="without `--verified`", default=None
+    )
 
     @property
+    @says(null="where it is not below 1", why=lambda found: found.why_no_factor)
     def factor(self) -> Number | None:
-        """The Lipschitz constant where it is a contraction factor."""
+        """A proved factor of one step in real arithmetic: the Lipschitz constant where it contracts."""
         return self.lipschitz if self.lipschitz.value < 1 else None
 
     @property
+    @says()
     def gap(self) -> float:
-        """Relative distance of the bound from the largest factor found."""
+        """``lipschitz / lower - 1``."""
         return self.lipschitz.value / self.lower - 1
 
     @property
+    @says()
     def certified(self) -> bool:
-        """True if the factor is proved beyond a computation in doubles."""
+        """Whether `lipschitz` is proved, at level `verified`.
+
+        By the multipliers of one program, for all pieces of T at once.
+        """
         return self.lipschitz.level != "float"
 
     @property
@@ -336,25 +350,10 @@ class Semidefinite:
             return ""
         return self.gave_up or f"its bound {self.lipschitz.value:.3g} of the Lipschitz constant is not below 1"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``lmi`` of ``ndtheory.compare/1``."""
-        reasons = {
-            "factor": self.why_no_factor,
-            "lipschitz": "",
-            "theta_max": "no theta is proved to contract at this friction",
-            "friction_threshold": self.no_threshold,
-        }
-        reason = {name: why for name, why in reasons.items() if getattr(self, name) is None}
-        return {
-            **{name: to_plain(getattr(self, name)) for name in reasons},
-            "lower": self.lower,
-            "gap": self.gap,
-            "programs": self.programs,
-            "certified": self.certified,
-            **({} if self.divided is None else {"divided": self.divided.to_dict()}),
-            **({} if self.unverified is None else {"unverified": dict(self.unverified)}),
-            "reason": reason if self.certified else reason | {"certified": self.not_proved},
-        }
+    @property
+    def reason(self) -> dict[str, str]:
+        """Why the Lipschitz constant is not proved."""
+        return {} if self.certified else {"certified": self.not_proved}
 
     def proved(
         self, pair: ContactPair, measured: Measured, theta: Fraction, *, progress: Progress = silent

@@ -94,7 +94,7 @@ GIVEN, RESULTS = tuple(COLUMNS)[:9], tuple(COLUMNS)[9:]
 def title(column: str, units: Mapping[str, str]) -> str:
     """Return the full name of a column, with its unit where that is not 1."""
     one = COLUMNS[column]
-    return one.says.partition(";")[0] + (f" ({units[one.unit]})" if one.unit in units else "")
+    return one.says.partition(";")[0] + (f" ({units[one.unit]})" if one.unit and one.unit in units else "")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
