@@ -30,15 +30,11 @@ from pathlib import Path
 from types import NoneType, SimpleNamespace, UnionType
 from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from ndtheory.number import Number
-
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 
 #: The types of Python as those of the tables; a class of parts is named, or an object with keys of its own.
-TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"} | {
-    Number: "Number"
-}
+TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"}
 
 #: The types that have a unit.
 NUMBERS = {"integer", "number", "Number"}
