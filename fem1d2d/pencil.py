@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import eigh, eigh_tridiagonal
+from scipy.linalg import eigh
 from scipy.linalg.lapack import dpotrf, dpotrs, dsygvx, dsygvx_lwork
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fem1d2d.condense import solver
 from fem1d2d.mesh import Floats, Ints
@@ -23,19 +23,20 @@ DENSE = 40
 #: The relative residual asked of Lanczos.
 LANCZOS = 1e-10
 
-#: Vectors that Lanczos keeps; when they are full it restarts from what they have found.
-BASIS = 24
+#: Vectors that Lanczos keeps, and how many of the upper end of the spectrum stay when they are full and it restarts.
+BASIS, KEPT = 40, 15
 
-#: Most steps of the Lanczos without restart that is tried first on sparse matrices, and the step from which on it
-#: checks the residual.
-PLAIN, SOON = 40, 8
+#: The same where both ends are wanted; then numbers from the lower and from the upper end.
+LONG_BASIS, KEPT_BOTH = 120, (15, 30)
 
-#: Where products and solves are given as functions, they cost more than memory: vectors kept then, and the numbers of
-#: them that a restart keeps from the lower and from the upper end.
-LONG_BASIS, KEPT = 120, (15, 30)
+#: The step from which on the residual is looked at.
+SOON = 8
 
-#: Steps from one look at the ends of the spectrum to the next: it costs as much as a step with 10^4 unknowns.
+#: Where both ends are wanted: steps from one look to the next, which costs as much as a step with 10^4 unknowns.
 LOOK = 5
+
+#: Most steps of Lanczos for the largest eigenvalue, and how often it starts again from the vector that it has found.
+MOST, RESTARTS = 3000, 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,11 +58,17 @@ class Eigenvalue:
     residual: float
 
 
-def rayleigh_quotient(A: Any, B: Any, x: Floats, solve_B: Callable[[Floats], Floats]) -> Eigenvalue:
-    """The Rayleigh quotient of any vector x, for arrays, sparse arrays or linear operators A and B."""
-    x = x / math.sqrt(float(x @ (B @ x)))
-    value = float(x @ (A @ x))
-    r: Floats = A @ x - value * (B @ x)
+def rayleigh_quotient(
+    apply_A: Callable[[Floats], Floats],
+    apply_B: Callable[[Floats], Floats],
+    x: Floats,
+    solve_B: Callable[[Floats], Floats],
+) -> Eigenvalue:
+    """The Rayleigh quotient of any vector x."""
+    x = x / math.sqrt(float(x @ apply_B(x)))
+    force, mass = apply_A(x), apply_B(x)
+    value = float(x @ force)
+    r: Floats = force - value * mass
     x.setflags(write=False)
     return Eigenvalue(value=value, vector=x, residual=math.sqrt(max(float(r @ solve_B(r)), 0.0)))
 
@@ -82,7 +89,9 @@ def largest(A: Floats, B: Floats) -> Eigenvalue:
     if failed or not count:  # LAPACK's subsets miss an eigenvalue of high multiplicity
         _, vectors = eigh(A, B, driver="gvd")
         count = n
-    return rayleigh_quotient(A, B, vectors[:, count - 1], lambda r: np.asarray(dpotrs(factor, r)[0]))
+    return rayleigh_quotient(
+        A.__matmul__, B.__matmul__, vectors[:, count - 1], lambda r: np.asarray(dpotrs(factor, r)[0])
+    )
 
 
 @lru_cache(maxsize=256)
@@ -130,31 +139,30 @@ def largest_of(
     >>> round(found.value, 9), found.residual < 1e-9
     (6.0, True)
     """
-    A, B = (LinearOperator((n, n), matvec=apply, dtype=float) for apply in (apply_A, apply_B))
     if n <= DENSE:
-        return largest(*((M + M.T) / 2 for M in (A @ np.eye(n), B @ np.eye(n))))
+        columns = ([apply(e) for e in np.eye(n)] for apply in (apply_A, apply_B))
+        return largest(*((M + M.T) / 2 for M in map(np.array, columns)))
     sigma, solve = (None, solve_B) if above is None else above
-    steps = 0
+    count = itertools.count(1)
 
     def step(r: Floats) -> Floats:
-        nonlocal steps
         x = solve(r)
-        steps += 1
-        progress(steps)
-        return x if sigma is None else -x
+        progress(next(count))
+        return x
 
-    operator = LinearOperator((n, n), matvec=step, dtype=float)
-    options: dict[str, Any] = {"k": 1, "M": B, "tol": tolerance, "ncv": min(n - 1, BASIS)}
-    options |= (
-        {"Minv": operator, "which": "LA"} if sigma is None else {"sigma": sigma, "OPinv": operator, "which": "LM"}
-    )
+    def enough(steps: int, values: Floats, residuals: Floats) -> bool:
+        return bool(residuals[-1] <= tolerance / 2 * abs(values[-1]))
+
+    product = apply_A if sigma is None else apply_B  # eigenvalues of (B, sigma B - A) are 1/(sigma - value)
     start = np.random.default_rng(0).standard_normal(n)
-    for _ in range(3):  # ARPACK's own estimate of the residual fails at some multiple eigenvalues; a restart mends it
-        _, vectors = eigsh(A, v0=start, **options)
-        found = rayleigh_quotient(A, B, vectors[:, 0], solve_B)
+    for _ in range(RESTARTS):  # a residual in another norm, or of a cluster, may be too large still
+        ritz = _lanczos(
+            product, step, start, room=BASIS, kept=(0, KEPT), most=MOST, look=lambda k: k > SOON, enough=enough
+        )
+        found = rayleigh_quotient(apply_A, apply_B, ritz.vectors[:, -1] @ ritz.X, solve_B)
         if found.residual <= tolerance * abs(found.value):
             break
-        start = found.vector
+        start = apply_B(found.vector) if sigma is None else sigma * apply_B(found.vector) - apply_A(found.vector)
     return found
 
 
@@ -205,12 +213,65 @@ def extremes_by_solves(
     >>> round(found.largest.value, 9), found.largest.residual < 1e-5, round(found.least.value, 3)
     (6.0, True, 2.0)
     """
-    room = min(n, LONG_BASIS)
+
+    def enough(steps: int, values: Floats, residuals: Floats) -> bool:
+        progress(steps, float(values[-1]), float(residuals[-1]))
+        scale = float(np.abs(values).max())
+        return bool(residuals[-1] <= tolerance * scale and residuals[0] <= least_tolerance * scale)
+
+    look = lambda steps: steps % LOOK == 1
+    start = np.random.default_rng(0).standard_normal(n)
+    ritz = _lanczos(apply_A, solve_B, start, room=LONG_BASIS, kept=KEPT_BOTH, most=most, look=look, enough=enough)
+
+    def pair(i: int) -> Eigenvalue:
+        force = ritz.vectors[:, i] @ ritz.Y
+        trace = solve_B(force)
+        unit = math.sqrt(float(trace @ force))
+        force, trace = force / unit, trace / unit
+        product = apply_A(trace)
+        value = float(trace @ product)
+        r = product - value * force
+        trace.setflags(write=False)
+        return Eigenvalue(value=value, vector=trace, residual=math.sqrt(max(float(r @ solve_B(r)), 0.0)))
+
+    return Extremes(least=pair(0), largest=pair(-1), steps=ritz.steps)
+
+
+class _Ritz(NamedTuple):
+    """What Lanczos ends with: coefficients of the Ritz vectors, as columns, in the rows of Y and of ``X = Y B^-1``."""
+
+    vectors: Floats
+    Y: Floats
+    X: Floats
+    steps: int
+
+
+def _lanczos(
+    apply_A: Callable[[Floats], Floats],
+    solve_B: Callable[[Floats], Floats],
+    y: Floats,
+    *,
+    room: int,
+    kept: tuple[int, int],
+    most: int,
+    look: Callable[[int], bool],
+    enough: Callable[[int, Floats, Floats], bool],
+) -> _Ritz:
+    """Lanczos for ``A B^-1`` from a vector y, symmetric in the scalar product ``y' B^-1 z``, orthogonalised in full.
+
+    When ``room`` vectors are full it restarts with some ``kept`` of the lower and of the upper end.  Where a ``look``
+    is due, ``enough`` takes the steps, the Ritz values and their residuals.  ValueError if ``y' B^-1 y`` is not
+    positive.
+    """
+    n = len(y)
+    room = min(n, room)
     Y, X = np.empty((room, n)), np.empty((room, n))  # y and x = B^-1 y, orthonormal: Y X' = 1
     H = np.zeros((room, room))
-    y = np.random.default_rng(0).standard_normal(n)
     x = solve_B(y)
-    beta, j = math.sqrt(float(x @ y)), 0
+    square = float(x @ y)
+    if not square > 0:
+        raise ValueError("a pencil whose second matrix is not positive definite")
+    beta, j = math.sqrt(square), 0
     for steps in range(1, most + 1):
         Y[j], X[j] = y / beta, x / beta
         y = np.array(apply_A(X[j]), dtype=float)
@@ -223,34 +284,19 @@ def extremes_by_solves(
         x = solve_B(y)
         exhausted = j + 1 == n or np.linalg.norm(y) <= n * np.finfo(float).eps * size
         beta = 0.0 if exhausted else math.sqrt(max(float(x @ y), 0.0))
-        if steps % LOOK == 1 or not beta or j + 1 == room or steps == most:
+        if look(steps) or not beta or j + 1 == room or steps == most:
             values, vectors = eigh(H[: j + 1, : j + 1])
-            residuals, scale = beta * np.abs(vectors[-1]), float(np.abs(values).max())
-            progress(steps, float(values[-1]), float(residuals[-1]))
-            if not beta or (residuals[-1] <= tolerance * scale and residuals[0] <= least_tolerance * scale):
+            if enough(steps, values, beta * np.abs(vectors[-1])) or not beta:
                 break
         j += 1
         if j == room and steps < most:
-            low, high = KEPT
-            kept = np.r_[:low, room - high : room]
-            j = len(kept)
-            Y[:j], X[:j] = vectors[:, kept].T @ Y, vectors[:, kept].T @ X
+            low, high = kept
+            ends = np.r_[:low, room - high : room]
+            j = len(ends)
+            Y[:j], X[:j] = vectors[:, ends].T @ Y, vectors[:, ends].T @ X
             H[:] = 0.0
-            H[np.arange(j), np.arange(j)] = values[kept]
-    rows = len(values)
-
-    def pair(i: int) -> Eigenvalue:
-        force = vectors[:, i] @ Y[:rows]
-        trace = solve_B(force)
-        unit = math.sqrt(float(trace @ force))
-        force, trace = force / unit, trace / unit
-        product = apply_A(trace)
-        value = float(trace @ product)
-        r = product - value * force
-        trace.setflags(write=False)
-        return Eigenvalue(value=value, vector=trace, residual=math.sqrt(max(float(r @ solve_B(r)), 0.0)))
-
-    return Extremes(least=pair(0), largest=pair(-1), steps=steps)
+            H[np.arange(j), np.arange(j)] = values[ends]
+    return _Ritz(vectors, Y[: len(vectors)], X[: len(vectors)], steps)
 
 
 def largest_sparse(
@@ -266,48 +312,7 @@ def largest_sparse(
     ``above`` is an upper bound of the spectrum, ``order`` an order of elimination for ``above * B - A``, see
     :func:`fem1d2d.condense.elimination_order`.
     """
-    n = A.shape[0]
-    if n <= DENSE:
+    if A.shape[0] <= DENSE:
         return largest(A.toarray(), B.toarray())
-    if above is None:
-        nearest, vector = None, _plain_lanczos(A, solve_B)
-    else:
-        nearest = (above, solver(above * B - A, order))
-        vector = _plain_lanczos(B, nearest[1])
-    found = rayleigh_quotient(A, B, vector, solve_B)
-    if found.residual <= LANCZOS * abs(found.value):
-        return found
-    return largest_of(A.__matmul__, B.__matmul__, solve_B, n, above=nearest)
-
-
-def _plain_lanczos(A: sp.csc_array, solve_B: Callable[[Floats], Floats]) -> Floats:
-    """Approximate eigenvector of the largest eigenvalue of (A, B), by Lanczos for ``B^-1 A`` without restart.
-
-    A step costs one product and one solve, with ARPACK three products, and it ends as soon as the residual is small
-    enough, which ARPACK checks only when its basis is full.
-    """
-    n = A.shape[0]
-    room = min(n, PLAIN)
-    Y, X = np.empty((room, n)), np.empty((room, n))  # y and x = B^-1 y, orthonormal: Y X' = 1
-    diagonal, beside = np.empty(room), np.empty(room)
-    y: Floats = np.random.default_rng(0).standard_normal(n)
-    x = solve_B(y)
-    beta = math.sqrt(max(float(x @ y), 0.0))
-    if not beta:
-        return y
-    for j in range(room):
-        np.divide(y, beta, out=Y[j])
-        np.divide(x, beta, out=X[j])
-        y = A @ X[j]
-        size = np.linalg.norm(y)
-        part = X[: j + 1] @ y
-        y -= part @ Y[: j + 1]
-        diagonal[j] = part[j]
-        x = solve_B(y)
-        exhausted = np.linalg.norm(y) <= n * np.finfo(float).eps * size
-        beside[j] = beta = 0.0 if exhausted else math.sqrt(max(float(x @ y), 0.0))
-        if j >= SOON or not beta or j + 1 == room:
-            value, vector = eigh_tridiagonal(diagonal[: j + 1], beside[:j], select="i", select_range=(j, j))
-            if beta * abs(vector[-1, 0]) <= LANCZOS / 2 * abs(value[0]):
-                break
-    return np.asarray(vector[:, 0] @ X[: j + 1])
+    nearest = None if above is None else (above, solver(above * B - A, order))
+    return largest_of(A.__matmul__, B.__matmul__, solve_B, A.shape[0], above=nearest)

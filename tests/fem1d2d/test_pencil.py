@@ -83,7 +83,7 @@ def test_the_residual_at_a_multiple_eigenvalue_is_as_small_as_at_a_simple_one(mu
 
 @pytest.mark.parametrize(("others", "most"), [(0.01, 12), (0.5, 24)])
 def test_lanczos_ends_at_the_step_at_which_the_residual_is_small_enough(others, most):
-    """The farther the other eigenvalues lie, the fewer solves; ARPACK with its 24 vectors takes 24 always."""
+    """The farther the other eigenvalues lie, the fewer solves."""
     n = 500
     diagonal = np.append(np.linspace(0, others, n - 1), 1.0)
     solves = []
@@ -98,7 +98,7 @@ def test_lanczos_ends_at_the_step_at_which_the_residual_is_small_enough(others, 
     assert len(solves) <= most
 
 
-def test_a_spectrum_that_the_plain_lanczos_cannot_resolve_is_left_to_the_one_that_restarts():
+def test_a_spectrum_that_the_vectors_kept_cannot_resolve_takes_restarts():
     n = 1000
     diagonal = np.linspace(0.0, 1.0, n) ** 0.5
     found = largest_sparse(*sparse(np.diag(diagonal), np.eye(n)))
@@ -294,7 +294,7 @@ def test_an_eigenvector_is_read_only():
 
 
 def certified(A, B, x):
-    return rayleigh_quotient(A, B, x, lambda r: np.linalg.solve(B, r))
+    return rayleigh_quotient(A.__matmul__, B.__matmul__, x, lambda r: np.linalg.solve(B, r))
 
 
 @given(pencils(), st.integers(0, 2**16))

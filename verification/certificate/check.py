@@ -1,24 +1,15 @@
-"""Check a certificate of contraction; needs only the standard library and python-flint: ``python check.py FILE``.
+"""Check a certificate of contraction: ``python check.py FILE``.  It needs Python and python-flint, nothing else.
 
-A certificate describes two elastic bodies on meshes of triangles in rational numbers and claims that the map T_theta of
-the Neumann-Dirichlet iteration between them has a Lipschitz constant, whatever the loads and the gap.  S_a are the
-Schur complements of the stiffness matrices on the contact nodes, the form ``.' S_n^-1 .`` is the squared norm of forces
-on the Neumann body, and P carries its traces to the contact nodes.  Two forces g = S_n d differ by p = S_c c after step
-II, and the displacement of the contact body relative to the other one by v = -(P d + c).  Step II gives, node by node::
+Two elastic bodies meet along Gamma_c with Coulomb friction of coefficient k.  One step of the Neumann-Dirichlet
+iteration takes a force psi to ``T_theta psi = theta T psi + (1 - theta) psi``: the Neumann body deforms under psi, and
+T psi is the reaction of the contact body, which is pressed against it.  A certificate describes the discrete bodies in
+rational numbers and claims that for all forces psi, psi~, whatever the loads, prescribed displacements and gaps::
 
-    p_N v_N >= 0,      p_T v_T >= -w k |zeta| |v_T|  with  zeta = kernel g_N,
+    |T_theta psi - T_theta psi~| <= factor |psi - psi~|,    |g|^2 = g' S_n^-1 g,
 
-so that for multipliers lambda, tau, a, b >= 0 with 4 a b >= tau^2 the sum over the nodes of
-``lambda p_N v_N + tau p_T v_T + w k (a zeta^2 + b v_T^2)`` is not negative.  The claim holds if::
-
-    factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2 - that sum
-
-is a positive definite form in (d, c).  Here it is enclosed in balls, from the rational data on, and decided.
-
-T_theta is piecewise affine, and a constant of all its pieces is one.  On a piece each node has v_N = 0 (normal, 1) or
-p_N = 0 (-1), and a sign e (signs, 1 or -1) with ``(p_T - e w k zeta) v_T = 0``; the first factor is 0 (slip, 1) or the
-other one (-1).  A tree divides the pieces by such cases.  Each of its leaves has multipliers, and for each case on the
-way to it one more, of any sign, for a form that vanishes there: a square, or the product.
+S_n and S_c being the stiffnesses of the Neumann and the contact body, as the contact nodes see them.  ``check`` is the
+outline of the proof, and each function says one step of it.  Numbers of the file are rational; those computed are balls
+of Arb, which hold the exact results, so that what holds of balls is proved.
 
 Whether bodies, normals, transfer and a kernel without a radius belong to a certain problem is not decided here.
 """
@@ -27,7 +18,9 @@ import hashlib
 import json
 import re
 import sys
+from collections.abc import Callable, Iterable, Iterator
 from itertools import accumulate, pairwise
+from typing import Any, NamedTuple
 
 from flint import arb, arb_mat, ctx, fmpq
 
@@ -37,269 +30,312 @@ UNREADABLE = (OSError, ArithmeticError, AttributeError, LookupError, TypeError, 
 #: Unknowns eliminated at once, and those whose effect on the contact nodes is added up at once.
 BLOCK, BATCH = 32, 128
 
+Json = Any  # a part of the file
+Unknown = tuple[int, int]  # a node and a component: 0 and 1 are x and y, at a contact node tangent and normal
+Rows = dict[Any, dict[Unknown, Any]]  # of a sparse matrix
+Form = list[Any]  # the coefficients of a linear form
+Cases = tuple[tuple[str, int, int, Any], ...]  # kind of division, contact node, 1 or -1, and the sign of the node
 
-dot = lambda u, v: u[0] * v[0] + u[1] * v[1]
-identity = lambda n: arb_mat([[int(i == j) for j in range(n)] for i in range(n)])
-part = lambda whole, rows, columns: arb_mat([[whole[i, j] for j in columns] for i in rows])
-gathered = lambda rows, at, columns: arb_mat(len(at), len(columns), [rows[i].get(j, 0) for i in at for j in columns])
-scaled = lambda values, rows: arb_mat([[arb(f) * x for x in row] for f, row in zip(values, rows.tolist(), strict=True)])
 
-#: A hash of the bodies and all else that the claim is about.
-digest = lambda data: hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+dot: Callable[[Any, Any], Any] = lambda u, v: u[0] * v[0] + u[1] * v[1]
+close: Callable[[Any, Any, Any], bool] = lambda one, other, size: bool(abs(one - other) < size / 10**6)
 
 
 class Refused(ValueError):
     """The claim is not proved by its certificate."""
 
 
-def check(discrete, claim, eliminated=None):
+def check(discrete: Json, claim: Json, eliminated: Callable[..., arb_mat] | None = None) -> None:
     """Raise Refused, KeyError or another ValueError unless the multipliers of a claim prove it.
 
-    ``eliminated`` may stand in for surface_stiffness where several claims are checked: it keeps what that returned.
+    T_theta is piecewise affine, and a Lipschitz constant of all its pieces is one of T_theta.  ``leaves`` divides the
+    pieces into sets.  In each the multipliers give a sum of products that is >= 0 for any two steps (``inequalities``,
+    ``equations``).  If ``factor^2 |g|^2 - |T_theta psi - T_theta psi~|^2`` (``margin``) always exceeds that sum, it is
+    not negative, as claimed.  How the multipliers were found does not matter.  (``eliminated`` may stand in for
+    surface_stiffness where several claims are checked.)
     """
-    stiffness = eliminated or surface_stiffness
     ctx.prec = min(int(claim["bits"]), 20000)
     theta, factor, k = map(rational, (claim["theta"], claim["factor"], discrete["friction"]))
     demand(0 < theta <= 1 and factor >= 0 and k >= 0, "0 < theta <= 1, a factor and a friction that are not negative")
-    neumann, contact = roles(discrete)
-    S_n, S_c = stiffness(neumann, both=True), stiffness(contact, both=k != 0)
-    n, m, t = len(contact["surface"]), len(neumann["surface"]), len(contact["surface"]) if k else 0
-    P = matrix(discrete["transfer"], n, m) if discrete["transfer"] else identity(n)
-    demand(P.ncols() == m, "a transfer between contact nodes that differ")
-    weights = [rational(w) for w in discrete["weights"]]
-    grids(discrete)
-    demand("radius" not in claim or hat(discrete, claim["radius"]), "a kernel that is the hat of the radius claimed")
-    # rows: forms in (d, c).  Without friction p_T = 0, and c is only the normal trace
-    at = lambda body, which: [(j, both[q]) for q in which for j, both in enumerate(axes(body))]
-    onto = at(contact, (0, 1) if k else (1,))
-    across = arb_mat([[P[i, j] * dot(u, w) for j, w in at(neumann, (0, 1))] for i, u in onto])
-    p = stacked([[arb_mat(t + n, 2 * m), S_c]]).tolist()
-    v = (-stacked([[across, identity(t + n)]])).tolist()
-    moved = across.transpose() * S_c  # P' p
-    corner, mixed = (factor**2 - (1 - theta) ** 2) * S_n, -theta * (1 - theta) * moved
-    square = -(theta**2) * moved.transpose() * S_n.solve(moved)
-    form = stacked([[corner, mixed], [mixed.transpose(), square]])
-    rubs, zeta = [k * w for w in weights[:t]], []
-    if k:
-        pressure = matrix(discrete["kernel"], n, m) * part(S_n, range(m, 2 * m), range(2 * m))
-        zeta = stacked([[pressure, arb_mat(n, 2 * n)]]).tolist()
-
-    def product(kind, j, case, sign):
-        """Two forms, one of which is 0 on the pieces of a case."""
-        demand(j in range(n if kind == "normal" else t), "a contact node")
-        if kind == "normal" or (kind, case) == ("slip", -1):
-            return [v[j] if kind == "slip" else v[t + j] if case > 0 else p[t + j]] * 2
-        excess = [x - sign * rubs[j] * y for x, y in zip(p[j], zeta[j], strict=True)]
-        return excess, (v[j] if kind == "signs" else excess)
-
+    steps = two_steps(discrete, k, eliminated or surface_stiffness)
+    contact_positions(discrete)  # which demands the weights of the trapezoid rule
+    demand("radius" not in claim or kernel_is_hat(discrete, claim["radius"]), "as kernel the hat of the radius claimed")
+    claimed = margin(steps, theta, factor)
     for leaf, cases in leaves(claim["multipliers"]):
-        lam, tau, a, b = (spread(leaf[name], n) for name in ("lambda", "tau", "a", "b"))
-        demand(all(x >= 0 for x in lam + tau + a + b), "multipliers that are not negative")
-        demand(all(4 * x * y >= z * z for x, y, z in zip(a, b, tau, strict=True)), "4 a b >= tau^2")
-        values = tau[:t] + lam + [w * x for each in (a, b) for w, x in zip(rubs, each[:t], strict=True)]
-        values += [rational(x) for x in leaf.get("equal", [])]
-        pairs = [*zip(p + zeta + v[:t], v + zeta + v[:t], strict=True), *(product(*case) for case in cases)]
-        demand(len(values) == len(pairs), "one more multiplier for each case")
-        left, right = (arb_mat(list(rows)) for rows in zip(*pairs, strict=True))
-        total = left.transpose() * scaled(values, right)
-        demand(definite(form - (total + total.transpose()) / 2), "multipliers that prove it in balls of these bits")
+        values, left, right = zip(*inequalities(steps, leaf), *equations(steps, leaf, cases), strict=True)
+        weighted = arb_mat([[arb(value) * x for x in form] for value, form in zip(values, right, strict=True)])
+        total = arb_mat(left).transpose() * weighted
+        exceeds = positive_definite(claimed - (total + total.transpose()) / 2)
+        demand(exceeds, "multipliers that prove it in balls of these bits")
 
 
-def leaves(tree, cases=(), signs=()):
-    """The leaves of a tree, each with its cases: kind of division, contact node, 1 or -1, and the sign of the node."""
-    if "cases" not in tree:
-        yield tree, cases
-        return
-    kind, j, branches, signs = tree["divided"], tree["node"], tree["cases"], dict(signs)
-    demand(len(branches) == 2, "both cases of each division")
-    demand(kind in ("normal", "signs") or (kind == "slip" and j in signs), "normal, signs, or then slip")
-    for branch, case in zip(branches, (1, -1), strict=True):
-        known = {**signs, j: case} if kind == "signs" else signs
-        yield from leaves(branch, (*cases, (kind, j, case, known.get(j))), known)
+def surface_stiffness(body: Json, both: bool) -> arb_mat:
+    """The Schur complement of a body's stiffness on its contact nodes: tangential components, then normal ones.
+
+    It is the least energy of displacements that are given there; without ``both`` only in the normal components.  All
+    other unknowns are eliminated from left to right; a block that may be singular, within its balls, ends the check.
+    """
+    rows, order = stiffness(body)
+    keep = [(node, p) for p in ((0, 1) if both else (1,)) for node in body["surface"]]
+    kept, used, answers = set(keep), Rows(), Rows()
+    demand(len(kept) == len(keep) and kept <= set(rows), "contact nodes that are free, each once")
+    inside = [unknown for unknown in order if unknown not in kept]
+    for start in range(0, len(inside), BLOCK):
+        block = inside[start : start + BLOCK]
+        near = {j for i in block for j in rows[i] if j in rows} - set(block)
+        front, beside = sorted(near - kept), [*sorted(near - kept), *sorted(near & kept)]
+        # for so few unknowns radii grow less from block to block by this method than by default
+        solved = gathered(rows, block, block).solve(gathered(rows, block, beside), algorithm="lu")
+        subtract(rows, front, beside, gathered(rows, block, front).transpose() * solved)
+        answers |= {i: dict(zip(beside, line, strict=True)) for i, line in zip(block, solved.tolist(), strict=True)}
+        used |= {i: rows.pop(i) for i in block}
+        if len(used) >= BATCH or start + BLOCK >= len(inside):  # one large product takes half of the time of several
+            met = [j for j in keep if any(j in row for row in used.values())]
+            subtract(rows, met, met, gathered(used, used, met).transpose() * gathered(answers, used, met))
+            used, answers = Rows(), Rows()
+    return gathered(rows, keep, keep)
 
 
-def surface_stiffness(body, both):
-    """The Schur complement on the contact nodes: tangential components first, then normal ones; or only these."""
+def stiffness(body: Json) -> tuple[Rows, list[Unknown]]:
+    """The stiffness matrix of all unknowns that no support holds, in rationals, and these from left to right.
+
+    Twice the energy of u is the integral of ``lambda (div u)^2 + 2 mu e(u) : e(u)``.  It is not negative, as E > 0 and
+    -1 < nu < 1/2, and that of one body, as its triangles do not overlap: listed twice they would be twice as stiff.
+    """
     points = [[rational(x) for x in point] for point in body["points"]]
     young, nu = rational(body["young"]), rational(body["poisson"])
     demand(young > 0 and -1 < nu < fmpq(1, 2), "E > 0 and -1 < nu < 1/2")
-    first, second = young * nu / ((1 - 2 * nu) * (1 + nu)), young / (2 * (1 + nu))  # Lame
-    held = {(node, p) for node, p in body["held"]}
+    lame_lambda, lame_mu = young * nu / ((1 - 2 * nu) * (1 + nu)), young / (2 * (1 + nu))
+    held, upright = {(node, p) for node, p in body["held"]}, ((1, 0), (0, 1))
     named = {i for cell in body["cells"] for i in cell} | set(body["surface"]) | {node for node, _ in held}
     demand(all(type(i) is int and 0 <= i < len(points) for i in named), "node numbers")
-    rows, upright = {}, ((1, 0), (0, 1))
-    turned = {node: both for node, both in zip(body["surface"], axes(body), strict=True) if both != upright}
+    turned = {i: axes for i, axes in zip(body["surface"], tangents_and_normals(body), strict=True) if axes != upright}
     demand(not any(node in turned for node, _ in held), "no support of a contact node with its own normal")
+    rows = Rows()
     for cell in body["cells"]:
         (x0, y0), (x1, y1), (x2, y2) = (points[i] for i in cell)
         twice = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
         demand(twice > 0, f"cell {cell} anticlockwise, of positive area")
-        slope = [(y1 - y2, x2 - x1), (y2 - y0, x0 - x2), (y0 - y1, x1 - x0)]  # gradients times twice the area
-        for i, g in zip(cell, slope, strict=True):
-            for j, h in zip(cell, slope, strict=True):
-                for p, u in enumerate(turned.get(i, upright)):
-                    for q, w in enumerate(turned.get(j, upright)):
-                        if (i, p) not in held and (j, q) not in held:
-                            shear = dot(g, w) * dot(h, u) + dot(g, h) * dot(u, w)
-                            value, row = first * dot(g, u) * dot(h, w) + second * shear, rows.setdefault((i, p), {})
-                            row[j, q] = row.get((j, q), 0) + value / (2 * twice)
-    apart([[points[i] for i in cell] for cell in body["cells"]])
-    keep = [(node, p) for p in ((0, 1) if both else (1,)) for node in body["surface"]]
-    demand(len(set(keep)) == len(keep) and not held & set(keep), "contact nodes that are free, each once")
-    kept, done = set(keep), []
-    inside = sorted(set(rows) - kept, key=lambda unknown: (points[unknown[0]], unknown))
-    for start in range(0, len(inside), BLOCK):
-        block = inside[start : start + BLOCK]
-        near = set().union(*(rows[i] for i in block)) - set(block)
-        front, reached = sorted(near - kept), sorted(near & kept)
-        beside = front + reached
-        # for so few unknowns radii grow less from block to block by this method than by default
-        solved = gathered(rows, block, block).solve(gathered(rows, block, beside), algorithm="lu")
-        lessen(rows, front, beside, gathered(rows, block, front).transpose() * solved)
-        for i in front:
-            for j in block:
-                rows[i].pop(j, None)
-        for i, line in zip(block, solved.tolist(), strict=True):
-            done.append((rows.pop(i), dict(zip(beside, line, strict=True))))
-        if len(done) >= BATCH or start + BLOCK >= len(inside):  # one large product takes half of the time of several
-            reached = [j for j in keep if any(j in row for row, _ in done)]
-            coupling, solved = (gathered(some, range(len(done)), reached) for some in zip(*done, strict=True))
-            lessen(rows, reached, reached, coupling.transpose() * solved)
-            done = []
-    return gathered(rows, keep, keep)
+        slopes = zip(cell, [(y1 - y2, x2 - x1), (y2 - y0, x0 - x2), (y0 - y1, x1 - x0)], strict=True)
+        basis = [(i, p, g, u) for i, g in slopes for p, u in enumerate(turned.get(i, upright)) if (i, p) not in held]
+        for i, p, g, u in basis:  # the displacement u at a node has the gradient u g' over twice the area
+            row = rows.setdefault((i, p), {})
+            for j, q, h, w in basis:
+                shear = dot(g, w) * dot(h, u) + dot(g, h) * dot(u, w)
+                value = lame_lambda * dot(g, u) * dot(h, w) + lame_mu * shear
+                row[j, q] = row.get((j, q), 0) + value / (2 * twice)
+    demand_disjoint([[points[i] for i in cell] for cell in body["cells"]])
+    return rows, sorted(rows, key=lambda unknown: (points[unknown[0]], unknown))
 
 
-def apart(cells):
-    """Demand that no two cells overlap: of two triangles that do not, one has a side with the other beyond it."""
+def demand_disjoint(triangles: list[Any]) -> None:
+    """Demand that no two triangles overlap: of two that do not, one has a side with the other one beyond it."""
     turn = lambda a, b, c: (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
     beyond = lambda one, other: any(all(turn(one[i - 1], one[i], at) <= 0 for at in other) for i in range(3))
-    spans = ([(min(x), max(x)) for x in zip(*cell, strict=True)] for cell in cells)
-    near = []
-    for ((left, right), (low, high)), cell in sorted(zip(spans, cells, strict=True)):
+    boxes = ([(min(x), max(x)) for x in zip(*triangle, strict=True)] for triangle in triangles)
+    near: list[Any] = []  # those before, from left to right, that reach as far as the next one begins
+    for ((left, right), (low, high)), triangle in sorted(zip(boxes, triangles, strict=True)):
         near = [other for other in near if other[0] > left]
         for _, bottom, top, other in near:
-            clear = bottom >= high or top <= low or beyond(cell, other) or beyond(other, cell)
-            demand(clear, "cells that do not overlap, each listed once")
-        near.append((right, low, high, cell))
+            apart = bottom >= high or top <= low or beyond(triangle, other) or beyond(other, triangle)
+            demand(apart, "cells that do not overlap, each listed once")
+        near.append((right, low, high, triangle))
 
 
-def roles(discrete):
-    """The Neumann body and the contact body."""
+def tangents_and_normals(body: Json) -> list[Any]:
+    """Tangent and normal of each contact node; along x and y where the body lists none."""
+    normals = [(rational(x), rational(y)) for x, y in body.get("normals") or [["0", "1"]] * len(body["surface"])]
+    demand(len(normals) == len(body["surface"]) and all(dot(n, n) == 1 for n in normals), "normals of length 1")
+    return [((y, -x), (x, y)) for x, y in normals]
+
+
+def neumann_and_contact(discrete: Json) -> list[Json]:
+    """The body that takes forces, and the body that is pressed against it."""
     demand(discrete["neumann_body"] in (1, 2), "neumann_body 1 or 2")
     return [discrete[f"body{i}"] for i in ((2, 1) if discrete["neumann_body"] == 2 else (1, 2))]
 
 
-#: Positions in doubles, or along a line with corners, are rounded: a rule for the weights and the kernel is met so far.
-close = lambda one, other, size: abs(one - other) < size / 10**6
+def contact_positions(discrete: Json) -> tuple[list[arb], list[arb]]:
+    """Positions of the contact nodes and the Neumann nodes, along x or along their lines: as the weights have it.
 
-
-def grids(discrete):
-    """Positions of the contact nodes and of the Neumann nodes, along x or along both lines, as the weights have it."""
-    neumann, contact = map(positions, roles(discrete))
-    weights = [rational(w) for w in discrete["weights"]]
-    for own, other in zip(contact, neumann, strict=True):
-        widths = [b - a for a, b in pairwise(own)]
-        halves = [(a + b) / 2 for a, b in zip([0, *widths], [*widths, 0], strict=True)]
+    The weights must be those of the trapezoid rule for one of these, and a kernel with a radius its hat.  Positions may
+    be rounded: both are compared up to 1e-6, and the proof uses the numbers that are listed.
+    """
+    weights, both = [rational(w) for w in discrete["weights"]], []
+    for body in neumann_and_contact(discrete):
+        nodes = [[arb(rational(x)) for x in body["points"][i]] for i in body["surface"]]
+        lengths = (((a - x) ** 2 + (b - y) ** 2).sqrt() for (a, b), (x, y) in pairwise(nodes))
+        both.append(([x for x, _ in nodes], [*accumulate(lengths, initial=arb(0))]))
+    for other, own in zip(*both, strict=True):
+        widths = [b - a for a, b in pairwise([own[0], *own, own[-1]])]
+        halves = [(a + b) / 2 for a, b in pairwise(widths)]
         if len(halves) == len(weights) and all(close(w, h, h) for w, h in zip(weights, halves, strict=True)):
             return own, (other if discrete["transfer"] else own)
     raise Refused("needed the trapezoid weights of the contact nodes")
 
 
-def positions(body):
-    """Abscissas of the contact nodes, and distances along their line."""
-    nodes = [[arb(rational(x)) for x in body["points"][i]] for i in body["surface"]]
-    lengths = (((a - x) ** 2 + (b - y) ** 2).sqrt() for (a, b), (x, y) in pairwise(nodes))
-    return [x for x, _ in nodes], [*accumulate(lengths, initial=arb(0))]
+def kernel_is_hat(discrete: Json, radius: Json) -> bool:
+    """True if the kernel is the hat of a radius, ``max(0, 1 - |x - y|/r)/r``."""
+    r, (own, other) = arb(rational(radius)), contact_positions(discrete)
+    hat = [[arb(0).max(1 - abs(x - y) / r) / r for y in other] for x in own]
+    listed = rational_matrix(discrete["kernel"], len(own), len(other)).tolist()
+    return all(close(a, b, 1 / r) for rows in zip(listed, hat, strict=True) for a, b in zip(*rows, strict=True))
 
 
-def hat(discrete, radius):
-    """True if the kernel is the hat of a radius on the grids."""
-    r, (own, other) = arb(rational(radius)), grids(discrete)
-    wanted = [[arb(0).max(1 - abs(x - y) / r) / r for y in other] for x in own]
-    listed = matrix(discrete["kernel"], len(own), len(other)).tolist()
-    return all(close(a, b, 1 / r) for rows in zip(listed, wanted, strict=True) for a, b in zip(*rows, strict=True))
+class TwoSteps(NamedTuple):
+    """What two steps differ by, as linear forms in (d, c): ``p`` and ``v`` by component, tangential ones first."""
+
+    S_n: arb_mat
+    moved: arb_mat  # P' p as a matrix that is applied to c
+    p: list[Form]
+    v: list[Form]
+    zeta: list[Form]
+    rubs: list[fmpq]  # w k
 
 
-def axes(body):
-    """Tangent and normal of each contact node; along x and y where the body lists none."""
-    given = body.get("normals") or [["0", "1"]] * len(body["surface"])
-    normals = [(rational(x), rational(y)) for x, y in given]
-    demand(len(normals) == len(body["surface"]) and all(dot(n, n) == 1 for n in normals), "normals of length 1")
-    return [((y, -x), (x, y)) for x, y in normals]
+def two_steps(discrete: Json, k: fmpq, eliminated: Callable[..., arb_mat]) -> TwoSteps:
+    """Let the forces on the Neumann body differ by ``g = S_n d``, so that its displacements differ by d.
+
+    Let those of the contact body then differ by -c.  Its reactions differ by ``p = S_c c``, the jumps by
+    ``v = -(P d + c)``, P being the transfer between both grids, and the friction bounds by at most ``w k |zeta|``,
+    ``zeta = kernel g_N``.  Without friction ``p_T = 0``, and c has only normal components.
+    """
+    neumann, contact = neumann_and_contact(discrete)
+    n, m = len(contact["surface"]), len(neumann["surface"])
+    S_n, S_c = eliminated(neumann, both=True), eliminated(contact, both=k != 0)
+    P = rational_matrix(discrete["transfer"], n, m) if discrete["transfer"] else arb_mat(n, n, 1)
+    demand(P.ncols() == m, "a transfer between contact nodes that differ")
+    components = lambda body, which: [(j, axes[q]) for q in which for j, axes in enumerate(tangents_and_normals(body))]
+    of, onto = components(neumann, (0, 1)), components(contact, (0, 1) if k != 0 else (1,))
+    across = [[P[i, j] * dot(u, w) for j, w in of] for i, u in onto]
+    p = [[arb(0)] * len(of) + row for row in S_c.tolist()]
+    v = [[-x for x in row] + [-arb(i == j) for j in range(len(onto))] for i, row in enumerate(across)]
+    zeta = rational_matrix(discrete["kernel"], n, m) * arb_mat(S_n.tolist()[m:]) if k != 0 else arb_mat(0, 2 * m)
+    moved, padded = arb_mat(across).transpose() * S_c, [row + [arb(0)] * len(onto) for row in zeta.tolist()]
+    return TwoSteps(S_n, moved, p, v, padded, [k * rational(w) for w in discrete["weights"] if k != 0])
 
 
-def lessen(rows, wanted, columns, less):
-    """Subtract a matrix from the entries of some rows."""
-    left = gathered(rows, wanted, columns) - less
-    for i, line in zip(wanted, left.tolist(), strict=True):
-        rows[i].update(zip(columns, line, strict=True))
+def margin(steps: TwoSteps, theta: fmpq, factor: fmpq) -> arb_mat:
+    """``factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2`` as a matrix in (d, c); ``|g|^2 = d' S_n d``."""
+    corner, mixed = (factor**2 - (1 - theta) ** 2) * steps.S_n, -theta * (1 - theta) * steps.moved
+    square = -(theta**2) * steps.moved.transpose() * steps.S_n.solve(steps.moved)
+    halves = ((corner, mixed), (mixed.transpose(), square))
+    return arb_mat([a + b for half in halves for a, b in zip(*(part.tolist() for part in half), strict=True)])
 
 
-def definite(form):
-    """True if every symmetric matrix in these balls is positive definite: by halves and their Schur complement."""
-    n = form.nrows()
-    if n == 1:
+def inequalities(steps: TwoSteps, leaf: Json) -> Iterator[tuple[fmpq, Form, Form]]:
+    """Products whose sum is >= 0: ``lambda p_N v_N + tau p_T v_T + w k (a zeta^2 + b v_T^2)`` at each node.
+
+    Pressure is a monotone function of the jump: ``p_N v_N >= 0``.  So is friction, but for its bound: ``p_T v_T >= -w k
+    |zeta| |v_T|``.  And ``tau |zeta| |v_T| <= a zeta^2 + b v_T^2``, as ``4 a b >= tau^2``.
+    """
+    t, n = len(steps.rubs), len(steps.v) - len(steps.rubs)
+    given = (leaf[name] for name in ("lambda", "tau", "a", "b"))  # one for each node, or one for all of them
+    lam, tau, a, b = ([rational(x) for x in (one if isinstance(one, list) else [one] * n)] for one in given)
+    demand(all(len(each) == n for each in (lam, tau, a, b)), f"{n} multipliers of each kind")
+    demand(all(x >= 0 for x in lam + tau + a + b), "multipliers that are not negative")
+    demand(all(4 * x * y >= z * z for x, y, z in zip(a, b, tau, strict=True)), "4 a b >= tau^2")
+    yield from zip(tau[:t] + lam, steps.p, steps.v, strict=True)
+    yield from ((w * x, zeta, zeta) for w, x, zeta in zip(steps.rubs, a[:t], steps.zeta, strict=True))
+    yield from ((w * x, slip, slip) for w, x, slip in zip(steps.rubs, b[:t], steps.v[:t], strict=True))
+
+
+def equations(steps: TwoSteps, leaf: Json, cases: Cases) -> Iterator[tuple[fmpq, Form, Form]]:
+    """Products that are 0 on the pieces of some cases, one for each, so that its multiplier may have any sign.
+
+    A node touches, ``v_N = 0`` (normal, 1), or is open, ``p_N = 0`` (-1).  For one e, 1 or -1 (signs), ``(p_T - e w k
+    zeta) v_T = 0``: the node slides, and the first factor is 0 (slip, 1), or it sticks, and the second one is (-1).
+    """
+    t, values = len(steps.rubs), [rational(x) for x in leaf.get("equal", [])]
+    demand(len(values) == len(cases), "one more multiplier for each case")
+    for value, (kind, j, case, sign) in zip(values, cases, strict=True):
+        demand(j in range(len(steps.v) - t if kind == "normal" else t), "a contact node")
+        if kind == "normal":
+            left = right = steps.v[t + j] if case > 0 else steps.p[t + j]
+        elif kind == "slip" and case < 0:
+            left = right = steps.v[j]
+        else:
+            left = [x - sign * steps.rubs[j] * y for x, y in zip(steps.p[j], steps.zeta[j], strict=True)]
+            right = steps.v[j] if kind == "signs" else left
+        yield value, left, right
+
+
+def leaves(tree: Json, cases: Cases = (), signs: Iterable[Any] = ()) -> Iterator[tuple[Json, Cases]]:
+    """The leaves of a tree, each with its cases.  A division has both cases of a node, so that no piece is left out."""
+    if "cases" not in tree:
+        yield tree, cases
+        return
+    kind, j, branches, known = tree["divided"], tree["node"], tree["cases"], dict(signs)
+    demand(len(branches) == 2, "both cases of each division")
+    demand(kind in ("normal", "signs") or (kind == "slip" and j in known), "normal, signs, or then slip")
+    for branch, case in zip(branches, (1, -1), strict=True):
+        known = {**known, j: case} if kind == "signs" else known
+        yield from leaves(branch, (*cases, (kind, j, case, known.get(j))), known.items())
+
+
+def positive_definite(form: arb_mat) -> bool:
+    """True if all symmetric matrices in these balls are positive definite: their half and its Schur complement are."""
+    half, rows = form.nrows() // 2, form.tolist()
+    if not half:
         return bool(form[0, 0] > 0)
-    head, tail = range(n // 2), range(n // 2, n)
-    A, B, C = part(form, head, head), part(form, head, tail), part(form, tail, tail)
-    return definite(A) and definite(C - B.transpose() * A.solve(B))
+    A, B = (arb_mat([row[part] for row in rows[:half]]) for part in (slice(half), slice(half, None)))
+    C = arb_mat([row[half:] for row in rows[half:]])
+    return positive_definite(A) and positive_definite(C - B.transpose() * A.solve(B))
 
 
-def demand(holds, needed):
+def demand(holds: bool, needed: str) -> None:
     if not holds:
         raise Refused(f"needed {needed}")
 
 
-def rational(text):
-    demand(isinstance(text, str) and re.fullmatch(r"-?\d{1,2000}(/\d{1,2000})?", text), f"a rational, not {text!r}")
+def rational(text: Json) -> fmpq:
+    readable = isinstance(text, str) and re.fullmatch(r"-?\d{1,2000}(/\d{1,2000})?", text)
+    demand(bool(readable), f"a rational, not {text!r}")
     return fmpq(*(int(part) for part in text.split("/")))
 
 
-def spread(values, n):
-    """A multiplier for each node, or one for all of them."""
-    found = [rational(x) for x in (values if isinstance(values, list) else [values] * n)]
-    demand(len(found) == n, f"{n} multipliers of each kind")
-    return found
-
-
-def matrix(rows, n, m):
+def rational_matrix(rows: Json, n: int, m: int) -> arb_mat:
     demand(len(rows) == n and all(len(row) == m for row in rows), f"a matrix of {n} x {m}")
     return arb_mat([[arb(rational(x)) for x in row] for row in rows])
 
 
-def stacked(blocks):
-    """A matrix from rows of matrices side by side."""
-    beside = lambda row: zip(*(block.tolist() for block in row), strict=True)
-    return arb_mat([[entry for line in lines for entry in line] for row in blocks for lines in beside(row)])
+def gathered(rows: Rows, wanted: Iterable[Any], columns: list[Any]) -> arb_mat:
+    entries = [[rows[i].get(j, 0) for j in columns] for i in wanted]
+    return arb_mat(len(entries), len(columns), [x for row in entries for x in row])
 
 
-def words(document):
+def subtract(rows: Rows, wanted: list[Any], columns: list[Any], less: arb_mat) -> None:
+    for i, line in zip(wanted, (gathered(rows, wanted, columns) - less).tolist(), strict=True):
+        rows[i].update(zip(columns, line, strict=True))
+
+
+def digest(data: Json) -> str:
+    """A hash of the bodies and all else that the claim is about."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def words(document: Json) -> str:
     """The claim and its bodies, for a reader."""
     discrete, claim = document["discrete"], document["claim"]
     bodies = [
         f"{name}: {len(body['points'])} nodes, {len(body['cells'])} triangles, E {body['young']}, nu {body['poisson']}"
         for name, body in ((name, discrete[name]) for name in ("body1", "body2"))
     ]
-    kernel = f"k {discrete['friction']} with the "
-    kernel += f"hat kernel of radius {claim['radius']}" if "radius" in claim else "kernel that it lists"
-    friction = kernel if rational(discrete["friction"]) else "no friction"
+    kernel = f"hat kernel of radius {claim['radius']}" if "radius" in claim else "kernel that it lists"
+    friction = f"k {discrete['friction']} with the {kernel}" if rational(discrete["friction"]) != 0 else "no friction"
     at = f"Neumann problem: body {discrete['neumann_body']}, {friction}, theta {claim['theta']}"
-    spare = 1 - rational(claim["factor"])
-    return "; ".join([*bodies, at, f"Lipschitz constant at most 1 - {float(arb(spare).mid()):.10g}"])
+    spare = float(arb(1 - rational(claim["factor"])).mid())
+    return "; ".join([*bodies, at, f"Lipschitz constant at most 1 - {spare:.10g}"])
 
 
-def examine(document):
+def examine(document: Json) -> None:
     """Raise one of UNREADABLE unless a certificate proves its claim."""
     demand(document["sha256"] == digest(document["discrete"]), "the hash of its own bodies")
     check(document["discrete"], document["claim"])
 
 
-def show(text):
-    """Print a text that may come from the certificate on one line, without what steers a terminal."""
-    print("".join(c if c.isprintable() else ascii(c)[1:-1] for c in text))
-
-
-def main(path):
+def main(path: str) -> int:
+    show = lambda text: print(repr(text)[1:-1])  # it may come from the certificate: nothing in it steers a terminal
     try:
         with open(path, encoding="utf-8") as file:
             document = json.load(file)

@@ -211,7 +211,7 @@ def certify(
     if claim is None:
         raise NoCertificate(f"{BOUNDS[edition].words} {NOT_CONFIRMED.format(spare)}")
     radius = problem.contact.radius
-    if pair.friction and radius is not None and check.hat(discrete, str(radius)):
+    if pair.friction and radius is not None and check.kernel_is_hat(discrete, str(radius)):
         claim["radius"] = str(radius)
     return Certificate(edition=edition, discrete=discrete, claim=claim, problem=problem, lower=lower)
 

@@ -52,7 +52,7 @@ def test_no_certificate_that_is_accepted_is_false(benchmark):
 
 
 def test_a_checker_that_takes_every_form_as_definite_accepts_false_certificates(benchmark, monkeypatch):
-    monkeypatch.setattr(check, "definite", lambda form: True)
+    monkeypatch.setattr(check, "positive_definite", lambda form: True)
     _, false = records(benchmark, 1)
     assert false
 
@@ -135,7 +135,7 @@ def test_a_body_whose_cells_lie_on_each_other_is_refused(several, benchmark, mon
     several(body)
     assert "cells that do not overlap" in refused(document, body1=body)
     if several is each_cell_four_times:
-        monkeypatch.setattr(check, "apart", lambda cells: None)
+        monkeypatch.setattr(check, "demand_disjoint", lambda cells: None)
         assert not refused(document, body1=body)
 
 
