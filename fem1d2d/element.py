@@ -7,17 +7,40 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.material import Material
-from fem1d2d.mesh import Cells, Floats, MeshError, measures
+from fem1d2d.mesh import Cells, Floats, Mesh, MeshError, crossed, measures
 
 
 class Element(ABC):
-    """Shape functions on the cells of a mesh, and their integrals; :data:`ELEMENTS` lists the elements in use."""
+    """Shape functions on the cells of a mesh, and their integrals; :data:`ELEMENTS` lists the elements in use.
+
+    Matrices, loads, strains and stresses follow from them, for a material in each cell too.  What else an element
+    supports it declares, and who needs that asks :func:`lacks`.
+
+    Attributes
+    ----------
+    words : str
+        Its cells, for messages.
+    vtk : str
+        What meshio calls its cells; empty where files for ParaView have none like them.
+    supports : frozenset of str
+        ``waves``: the layers of :mod:`fem1d2d.layers` are of its cells; ``proofs``: its matrices of rational meshes are
+        rational, and the checker of certificates knows them.
+    """
+
+    words: str = "cells of another element"
+    vtk: str = ""
+    supports: ClassVar[frozenset[str]] = frozenset()
+
+    def locks(self, mesh: Mesh) -> bool:
+        """True if it is known to be too stiff on a mesh as Poisson's ratio comes near 1/2."""
+        return False
 
     @abstractmethod
     def points(self, mesh: Cells) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
@@ -32,8 +55,16 @@ class Element(ABC):
         return np.asarray(self.mass(mesh).sum(axis=2))
 
 
+@dataclass(frozen=True)
 class P1(Element):
     """Hat functions on simplices: their gradients are constant on a cell."""
+
+    words: str
+    vtk: str
+    supports = frozenset({"waves", "proofs"})
+
+    def locks(self, mesh: Mesh) -> bool:
+        return not crossed(mesh)
 
     def points(self, mesh: Cells) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
         return [(measures(mesh.points, mesh.cells), gradients(mesh))]
@@ -49,7 +80,10 @@ class P1(Element):
 
 
 #: The element of a cell, by dimension and number of nodes.
-ELEMENTS: dict[tuple[int, int], Element] = {(1, 2): P1(), (2, 3): P1()}
+ELEMENTS: dict[tuple[int, int], Element] = {(1, 2): P1("intervals", "line"), (2, 3): P1("triangles", "triangle")}
+
+#: What an element may lack, in words.
+ABILITIES = {"waves": "waves on layers", "proofs": "proofs", "vtk": "files for ParaView"}
 
 
 def element_of(mesh: Cells) -> Element:
@@ -59,6 +93,13 @@ def element_of(mesh: Cells) -> Element:
         known = " or ".join(str(k) for d, k in ELEMENTS if d == mesh.dimension)
         raise MeshError(f"cells of {nodes} nodes: there are elements of {known}")
     return ELEMENTS[mesh.dimension, nodes]
+
+
+def lacks(mesh: Cells, ability: str) -> str:
+    """Why something cannot be done with the cells of a mesh; empty where their element supports it."""
+    element = element_of(mesh)
+    has = element.vtk if ability == "vtk" else ability in element.supports
+    return "" if has else f"no {ABILITIES[ability]} with {element.words}"
 
 
 def gradients(mesh: Cells) -> NDArray[Any]:

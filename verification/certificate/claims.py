@@ -19,6 +19,7 @@ import numpy as np
 from flint import ctx
 from numpy.typing import NDArray
 
+from fem1d2d.element import lacks
 from verification.certificate.check import check, surface_stiffness
 from verification.certificate.exact_bodies import ExactInterface, NotExact, exact_normals, exact_points
 from verification.constants.measured import FROM_MATRICES
@@ -243,6 +244,9 @@ def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any
             raise problem.refuse(f"{name}.young", [*spec.materials], needed)
     pair = pair_from(problem) if pair is None else pair
     meshed = [side.mesh_body for side in (pair.body1, pair.body2)]
+    for body in meshed:
+        if why := lacks(body.mesh, "proofs"):
+            raise problem.refuse(body.name, None, why)
     points = [exact_points(spec, body) for spec, body in zip((problem.body1, problem.body2), meshed, strict=True)]
     along = [p[body.nodes, 0] for p, body in zip(points, meshed, strict=True)]
     joined = ExactInterface(pair, *(along if pair.contact_body == 1 else along[::-1]))

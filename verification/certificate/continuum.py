@@ -36,6 +36,7 @@ from verification.interface.pair import pair_from
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
 from verification.problem import Problem, ProblemError
+from verification.registry import LAWS
 
 #: Radius of the kernel without friction, where C_s plays no part.
 ANY_RADIUS = Fraction(1)
@@ -180,8 +181,8 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
     if problem.dimension != 2:
         raise refuse("dimension", problem.dimension, "needed 2")
     law, friction = problem.contact.law, problem.contact.friction
-    if friction and law != "nonlocal":
-        raise refuse("contact.law", law, 'needed "nonlocal": the theorem does not apply to the local law')
+    if friction and LAWS[law].outside:
+        raise refuse("contact.law", law, f'needed "nonlocal": the theorem does not apply to the {LAWS[law].label} law')
     if problem.contact.lines:
         raise refuse("contact", None, "needed one table [contact], and two bodies")
     if problem.contact.surface is not None:

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d import interval, mortar, rectangle_points, trapezoid
+from fem1d2d.element import lacks
 from fem1d2d.proofs import exact
 from fem1d2d.proofs.enclosed import UNIT, Enclosed, gamma, nearest
 from fem1d2d.proofs.exact import Shapes
 from verification.interface.body import Body, in_frames, material_of
-from verification.interface.friction import Nonlocal
 from verification.interface.interface import Grid
 from verification.interface.join import joined
 from verification.interface.pair import ContactPair
@@ -62,6 +62,8 @@ class ExactBody:
         """
         if problem.contact.lines:
             raise NotExact("the contacts are tables [[contact]]")
+        if why := lacks(body.mesh, "proofs"):
+            raise NotExact(f"{body.name}: {why}")
         spec: BodySpec = getattr(problem, body.name)
         points, mesh = exact_points(spec, body), body.mesh
         try:
@@ -193,11 +195,9 @@ class ExactInterface:
         contact = problem.contact
         if law != LAWS[contact.law].of(contact.radius):
             raise NotExact("the law of friction was given from Python, and not by exact numbers")
-        if isinstance(law, Nonlocal):
-            law = replace(law, radius=contact.radius)  # type: ignore[arg-type]  # its formula takes any scalar
         interface = replace(self.pair.interface, contact=self.grid, neumann=self.other, join=self.join)
         try:
-            return np.asarray(interface.operator(law))
+            return np.asarray(interface.operator(law.exact(contact.radius)))
         except (TypeError, ValueError) as error:
             raise NotExact(f"law of friction: {error}") from None
 

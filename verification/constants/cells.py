@@ -8,9 +8,11 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
+from fem1d2d.element import lacks
 from fem1d2d.layers import Interface, Layer, peaks
 from ndtheory import Number
 from ndtheory.moduli import half_planes
+from verification.interface import assembly
 from verification.interface.body import material_of
 from verification.machine.threads import one_thread
 from verification.problem import Problem
@@ -100,6 +102,8 @@ def halved_cells(problem: Problem) -> Interface:
     for (name, body), side in zip(bodies.items(), SIDES, strict=True):
         if body.shape != "rectangle":
             raise NoCells(f"{name} is not a rectangle of equal cells")
+        if why := lacks(assembly.rectangle_of_cells((0.0, 1.0), (0.0, 1.0), (1, 1)), "waves"):
+            raise NoCells(f"{name}: {why}")
         if side in body.fixed or side in body.prescribed:
             raise NoCells(f"{name} is held along Gamma_c")
     contact, neumann = _roles(problem)

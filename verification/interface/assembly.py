@@ -13,7 +13,6 @@ from fem1d2d import (
     MeshError,
     Supports,
     body_load,
-    crossed,
     facet_weights,
     from_file,
     interval,
@@ -23,6 +22,7 @@ from fem1d2d import (
     stiffness,
     supports,
 )
+from fem1d2d.element import element_of
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
@@ -238,7 +238,7 @@ def nearly_incompressible(bodies: list[Body]) -> str:
 
 def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) -> list[str]:
     found = []
-    near = nearly_incompressible([body for body in bodies if not crossed(body.mesh)])
+    near = nearly_incompressible([body for body in bodies if element_of(body.mesh).locks(body.mesh)])
     if near:
         found.append(
             f"{near}: near 1/2 linear triangles make a body too stiff and scatter the nodal pressures (Hertz on a"
@@ -411,10 +411,15 @@ def _mesh(problem: Problem, spec: BodySpec, name: str) -> Mesh:
         if problem.dimension == 1:
             return interval(x, spec.cells[0])
         assert spec.y is not None
-        mesh = rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
+        mesh = rectangle_of_cells(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
         return _with_parts(problem, spec, name, mesh)
     except MeshError as error:  # coordinates that no longer differ in doubles
         raise problem.refuse(f"{name}.cells", list(spec.cells), str(error)) from None
+
+
+def rectangle_of_cells(x: tuple[float, float], y: tuple[float, float], cells: tuple[int, int]) -> Mesh:
+    """Return the mesh of a body with ``shape = "rectangle"``: its cells are those of one element."""
+    return rectangle(x, y, cells)
 
 
 def _with_parts(problem: Problem, spec: BodySpec, name: str, mesh: Mesh) -> Mesh:

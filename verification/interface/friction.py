@@ -69,6 +69,9 @@ class Nonlocal(Law):
     def scaled(self, length: float) -> Nonlocal:
         return replace(self, radius=self.radius * length)
 
+    def exact(self, radius: Fraction | None) -> Nonlocal:
+        return replace(self, radius=radius)  # type: ignore[arg-type]
+
     @property
     def words(self) -> str:
         return f"non-local, r = {self.radius:g}"

@@ -172,6 +172,14 @@ class Law(ABC):
         """
         return self
 
+    def exact(self, radius: Fraction | None) -> Law:
+        """Return the same law with the radius of the file as a rational, for a formula that takes any number."""
+        return self
+
+    def of_line(self, i: int) -> Law | None:
+        """Return the law of a line, of several."""
+        return self
+
     @property
     @abstractmethod
     def words(self) -> str:

@@ -36,6 +36,9 @@ class Blocks(Value, Law):
     parts: tuple[Interface, ...]
     scales: tuple[float, ...]
 
+    def of_line(self, i: int) -> Law | None:
+        return self.parts[i].law
+
     @property
     def words(self) -> str:
         each = dict.fromkeys("no law" if part.law is None else part.law.words for part in self.parts)
@@ -120,7 +123,7 @@ def join_lines(
             assert held is not None
             parts.append(_part(mesh, held, i))
         own, supports, first = zip(*parts, strict=True)
-        given = law.parts[number - 1].law if isinstance(law, Blocks) else law  # of a pair made before
+        given = None if law is None else law.of_line(number - 1)  # of a pair made before
         try:
             found, interface = _join_line(problem, line, order, list(own), list(supports), given)
         except ProblemError as error:

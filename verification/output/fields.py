@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fem1d2d import stresses, von_mises
+from fem1d2d import MeshError, stresses, von_mises
+from fem1d2d.element import element_of, lacks
 from fem1d2d.mesh import Floats
 from ndtheory import __version__
 from ndtheory.texts import printable
@@ -15,9 +16,6 @@ from verification.algorithm.history import History
 from verification.algorithm.monolithic import Solution
 from verification.algorithm.runs import Run
 from verification.interface.body import Body
-
-#: The cells of a mesh by its dimension, as VTK calls them.
-CELLS = {1: "line", 2: "triangle"}
 
 #: Rows and columns of a stress tensor in the order of VTK.
 SIX = (0, 1, 2, 0, 1, 0), (0, 1, 2, 1, 2, 2)
@@ -56,11 +54,13 @@ def _write(path: Path, body: Body, u: Floats, says: str) -> None:
     import meshio
 
     mesh = body.mesh
+    if why := lacks(mesh, "vtk"):
+        raise MeshError(f"{body.name}: {why}")
     spatial = lambda vectors: np.pad(vectors, ((0, 0), (0, 3 - mesh.dimension)))
     tensor = stresses(mesh, body.material, u)
     written = meshio.Mesh(
         spatial(mesh.points),
-        [(CELLS[mesh.dimension], mesh.cells)],
+        [(element_of(mesh).vtk, mesh.cells)],
         point_data={"displacement": spatial(u)},
         cell_data={"stress": [tensor[:, *SIX]], "von_mises": [von_mises(tensor)]},
     )
