@@ -12,7 +12,7 @@ from click.shell_completion import CompletionItem
 from ndtheory import HypothesisError, exact
 from ndtheory.texts import did_you_mean
 from verification.cli.console import complain, deliver, stages
-from verification.cli.forms import AdviseCommand, AdviseGroup, Default
+from verification.cli.forms import AdviseCommand, AdviseGroup, Default, cli
 from verification.cli.options import JSON, SET, SWAP, F, OneOf, Typed
 from verification.cli.problems import load_problem
 from verification.coupling.snippets import SNIPPETS
@@ -434,6 +434,7 @@ def vectors(iterates: Path, images: Path | None, tied: bool, snippets: str | Non
 
 
 advise = AdviseGroup(of_file, [matrices, run, moduli, vectors])
+cli.add_command(advise)
 
 
 def _no_document_of(snippets: str | None, as_json: bool) -> None:

@@ -12,7 +12,9 @@ from ndtheory.constants import take
 from verification.bounds.bound import NOT_ASKED, Subject
 from verification.bounds.table import ENERGY, SECTION_5, Calculated, Energy, Section5
 from verification.cli.console import deliver
-from verification.cli.options import OneOf, check_place, one_file
+from verification.cli.forms import cli
+from verification.cli.options import JSON, OneOf, one_file
+from verification.output.files import writing
 from verification.registry import BOUNDS
 from verification.sections.bounds import sections
 
@@ -20,7 +22,7 @@ from verification.sections.bounds import sections
 OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
 
 
-@click.command()
+@cli.command()
 @click.option("--m", "m", metavar="NUMBER", help="Smaller coercivity m^a of the bodies (stress).")
 @click.option("--M", "M", metavar="NUMBER", help="Sum of the continuity constants M^a (stress), so at least 2 m.")
 @click.option("--CR", "C_R", metavar="NUMBER", help="Lift constant, at least 1.")
@@ -51,7 +53,7 @@ OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
 )
 @one_file(".svg", ".png", words="Figure to draw: h_1 and h_2, which bound the squared factor, over theta")
 @click.option("--check", is_flag=True, help="Exit 1 unless contraction at theta is proved.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+@JSON
 def bounds(
     edition: str, theta: str | None, target: Path | None, check: bool, as_json: bool, **given: str | None
 ) -> int:
@@ -75,12 +77,8 @@ def bounds(
         of_section_5[key] is not None for key in ("m", "M", "C_R", "C_K", "C_s", "C_tr")
     )
     constants = None if alone else _constants(of_section_5)
-    if target is not None:
-        if constants is None:
-            raise click.UsageError(
-                "-o draws h_1 and h_2: it needs --m, --M, --CR and --CK", click.get_current_context()
-            )
-        check_place(target)
+    if target is not None and constants is None:
+        raise click.UsageError("-o draws h_1 and h_2: it needs --m, --M, --CR and --CK", click.get_current_context())
     friction = (
         take("k", 0 if given["k"] is None else given["k"], "a number k >= 0", lambda k: k >= 0)
         if constants is None
@@ -100,17 +98,15 @@ def bounds(
         else:
             results[name] = bound.evaluate(subject, theta)
     found = Calculated(constants=constants, energy=energy, theta=theta, results=results)
-    deliver(found, sections, as_json, None if target is None else lambda found: _draw(found, target), target)
+    deliver(found, sections, as_json, writing(target, _draw), target)
     proved = any(result.factor is not None and result.proved for result in results.values())
     return 1 if check and not proved else 0
 
 
-def _draw(found: Calculated, target: Path) -> None:
+def _draw(found: Calculated, path: Path) -> None:
     from verification.figures import save
-    from verification.output.files import staged
 
-    with staged(target.parent, shown=target) as room:
-        save(found.plot(), room / target.name)
+    save(found.plot(), path)
 
 
 def _constants(given: Mapping[str, str | None]) -> Constants:

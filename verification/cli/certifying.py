@@ -10,7 +10,8 @@ from typing import Any
 import click
 
 from verification.cli.console import deliver, fail, stages
-from verification.cli.options import JSON, SET, SWAP, THETA, Registered, Typed, check_place, one_file
+from verification.cli.forms import cli
+from verification.cli.options import JSON, PATH, SET, SWAP, THETA, Registered, Typed, one_file
 from verification.cli.problems import load_problem
 
 #: A certificate of a hundred contact nodes has a few megabytes.
@@ -23,8 +24,8 @@ def _editions() -> Sequence[str]:
     return certifying()[::-1]
 
 
-@click.command()
-@click.argument("file", type=click.Path(path_type=Path), required=False)
+@cli.command()
+@click.argument("file", type=PATH, required=False)
 @SET
 @THETA
 @SWAP
@@ -41,7 +42,7 @@ def _editions() -> Sequence[str]:
 @click.option(
     "--check",
     "given",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE.json",
     help="Check this one again; with FILE also whether it is about the bodies of FILE.",
 )
@@ -89,8 +90,6 @@ def certify(
             raise click.UsageError(f"received {first} with {second}: needed one of both", context)
     if file is None and given is None:
         raise click.UsageError("received nothing: needed FILE, or --check FILE.json", context)
-    if target is not None:
-        check_place(target)
     if continuum:
         assert file is not None
         return _prove_continuum(file, keys, theta=theta, swap=swap, target=target, as_json=as_json)

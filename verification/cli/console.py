@@ -8,10 +8,9 @@ import functools
 import io
 import math
 import os
-import select
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TextIO, TypeVar
 
 import click
@@ -35,6 +34,10 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=Document)
 
 
+#: The exit status after Ctrl-C.
+INTERRUPTED = 130
+
+
 class Lost(Exception):
     """The rest of a result is not worth computing: nobody can read it."""
 
@@ -45,108 +48,72 @@ def gone(error: OSError) -> bool:
     return no_pipe or isinstance(error, BrokenPipeError)
 
 
-class Interrupted(Exception):
-    """Ctrl-C, which a line on stderr has reported already."""
-
-
-#: Messages of a command that Ctrl-C ended before and after part of its result was shown.
-NOTHING, SHOWN = "interrupted before anything was computed", "interrupted; what was computed is shown above"
-
-
 @dataclass(kw_only=True)
 class _Stdout:
-    """The stream of results, its state, and the live line that makes room for them."""
+    """The stream of results while others write to stderr, what became of it, and the live line that makes room."""
 
     stream: TextIO | None = None
-    errors: list[OSError] = field(default_factory=list)
+    error: OSError | None = None
     kept: bool = False
-    live: Live | None = None
     said: bool = False
+    live: Live | None = None
 
 
 _stdout = _Stdout()
 
 
-class _Output(io.RawIOBase):
-    """Bytes to a file that never fails: the first error is kept, and nothing is written after it.
+def begin() -> None:
+    """Make the streams of this process safe to write to: closed ones lead nowhere, and keep their numbers from files.
 
-    Text that cannot be written would stay in the buffer of its stream, and fail again when Python ends: then the exit
-    status is Python's, whatever the command returned.
+    Characters beyond the encoding are written as escapes.
     """
-
-    def __init__(self, number: int, errors: list[OSError], closefd: bool) -> None:
-        self._file = open(number, "wb", buffering=0, closefd=closefd)  # noqa: SIM115
-        self._errors = errors
-
-    def writable(self) -> bool:
-        return True
-
-    def isatty(self) -> bool:
-        return self._file.isatty()
-
-    def fileno(self) -> int:
-        return self._file.fileno()
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
-
-    def write(self, data: Any) -> int:
-        try:
-            if not self._errors:
-                while (written := self._file.write(data)) is None:  # a pipe that does not block, and is full
-                    select.select([], [self], [])
-                return written
-        except OSError as error:
-            self._errors.append(error)
-        return len(data)
-
-
-def _text(number: int, like: TextIO | None, errors: list[OSError], closefd: bool = False) -> TextIO:
-    """A stream of text to a file by its number; characters beyond the encoding are written as escapes."""
-    encoding = "utf-8" if like is None else like.encoding
-    buffer = io.BufferedWriter(_Output(number, errors, closefd))
-    return io.TextIOWrapper(buffer, encoding=encoding, errors="backslashreplace", line_buffering=True)
-
-
-@contextlib.contextmanager
-def steady(*, last: bool) -> Iterator[None]:
-    """Return a context in which writing to stdout and stderr never fails; with ``last`` they stay so to the end.
-
-    No file that is opened meanwhile gets the number of a standard stream that is closed.
-    """
-    while (number := os.open(os.devnull, os.O_RDONLY)) <= 2:
-        os.set_inheritable(number, True)  # as the numbers of standard streams are
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
     os.close(number)
-    _stdout.errors.clear()
-    _stdout.kept = False
-    before = sys.stdout, sys.stderr
-    for name, number, errors in (("stdout", 1, _stdout.errors), ("stderr", 2, [])):
-        stream: TextIO | None = getattr(sys, name)
-        if stream is None or isinstance(stream, io.TextIOWrapper):
-            with contextlib.suppress(ValueError):  # a stream that writes to no file
-                setattr(sys, name, _text(number if stream is None else stream.fileno(), stream, errors))
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+        elif stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+            if name == "stdout":
+                _stdout.error = OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+
+def spend(stream: TextIO) -> OSError | None:
+    """Write out what a stream holds; where it cannot be written, it goes nowhere, and the error is returned.
+
+    Python would write it again when it ends, and fail with a status of its own.
+    """
     try:
-        yield
-    finally:
-        for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    except OSError as error:
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
             stream.flush()
-        if not last:
-            sys.stdout, sys.stderr = before
+        return error
+    return None
 
 
-def lost() -> OSError | None:
+def lost(error: OSError | None = None) -> OSError | None:
     """The error by which a part of the result was lost; None if there was none, or nobody reads what files have."""
-    sys.stdout.flush()
-    unread = lambda error: gone(error) or error.errno == errno.EBADF  # closed
-    return next((error for error in _stdout.errors if not (_stdout.kept and unread(error))), None)
+    spend(sys.stderr)
+    _stdout.error = spend(sys.stdout) or _stdout.error or error
+    error, _stdout.error = _stdout.error, None
+    unread = error is not None and (gone(error) or error.errno == errno.EBADF)  # closed
+    return None if _stdout.kept and unread else error
 
 
 def say(text: str, *, bold: bool = False) -> None:
     """Print lines of the result, control characters as escapes."""
     text = "\n".join(map(printable, text.split("\n")))
     _stdout.said = True
-    click.echo(click.style(text, bold=True) if bold else text, file=_stdout.stream)
+    stream = _stdout.stream or sys.stdout
+    try:
+        click.echo(click.style(text, bold=True) if bold else text, file=stream)
+    except OSError as error:
+        _stdout.error = _stdout.error or error
+        spend(stream)
 
 
 def show(sections: Sections, typing: Typing = nothing_typed, after: str = "") -> None:
@@ -178,7 +145,7 @@ def part(*, needed: bool = False) -> Iterator[None]:
         if _stdout.live is not None:
             _stdout.live.stop()
         yield
-        if _stdout.errors and not needed:
+        if _stdout.error is not None and not needed:
             raise Lost
         if _stdout.live is not None:
             _stdout.live.start()
@@ -186,59 +153,27 @@ def part(*, needed: bool = False) -> Iterator[None]:
 
 @contextlib.contextmanager
 def alone() -> Iterator[None]:
-    """Let only results reach stdout: what else is written there, by a C library too, goes to stderr."""
-    out, _stdout.said = sys.stdout, False
+    """Let only results reach stdout: what else is written there goes to stderr."""
+    _stdout.stream, _stdout.said, _stdout.kept = sys.stdout, False, False
     try:
-        number = out.fileno()
-    except (OSError, ValueError):  # no file: what no C library can reach
-        number = None
-    with contextlib.ExitStack() as stack:
-        if number is not None:
-            out.flush()
-            _stdout.stream = _text(os.dup(number), out, _stdout.errors, closefd=True)
-            stack.callback(_restore, _stdout.stream, number)
-            os.dup2(2, number)
-        else:
-            _stdout.stream = out
-        stack.callback(setattr, _stdout, "stream", None)
-        stack.enter_context(contextlib.redirect_stdout(sys.stderr))
-        yield
-
-
-def _restore(stream: TextIO, number: int) -> None:
-    """End a diversion of a file number: what C libraries still hold back leaves by the way it was written for."""
-    import ctypes
-
-    with contextlib.suppress(OSError, TypeError, AttributeError):  # Windows
-        ctypes.CDLL(None).fflush(None)
-    stream.flush()
-    os.dup2(stream.fileno(), number)
-    stream.close()
-
-
-def interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap a command: only its result reaches stdout, and it ends with one line after Ctrl-C."""
-
-    @functools.wraps(command)
-    def run(*args: Any, **options: Any) -> Any:
-        with alone():
-            try:
-                return command(*args, **options)
-            except KeyboardInterrupt:
-                complain(interruption())
-                raise Interrupted from None
-
-    return run
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _stdout.stream = None
 
 
 def interruption() -> str:
-    """The message on a Ctrl-C that ended the command."""
-    return SHOWN if _stdout.said else NOTHING
+    """The message on a Ctrl-C that ended the command, before or after part of its result was shown."""
+    said = "what was computed is shown above"
+    return f"interrupted; {said}" if _stdout.said else "interrupted before anything was computed"
 
 
 def complain(text: str) -> None:
     """Print an error, a warning or a note to stderr, control characters as escapes."""
-    click.echo(printable(text), err=True)
+    try:
+        click.echo(printable(text), err=True)
+    except OSError:
+        spend(sys.stderr)
 
 
 def deliver(
@@ -269,8 +204,7 @@ def deliver(
             write(document)
         _stdout.kept = True
     except KeyboardInterrupt:
-        complain(f"interrupted while {folder} was written; the result is shown above")
-        raise Interrupted from None
+        raise KeyboardInterrupt(f"interrupted while {folder} was written; the result is shown above") from None
     if not as_json:
         complain(f"written: {folder}")
 
@@ -358,24 +292,23 @@ def fail(error: Exception, outcome: str = "error", lead: str = "") -> int:
     return 1
 
 
-def reported(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap a command: a failure of a solver is reported with the file, and as a document."""
+def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap a command: only its result reaches stdout; Ctrl-C is one line, and so is a solver that fails."""
 
     @functools.wraps(command)
     def run(*args: Any, **options: Any) -> Any:
-        try:
-            return command(*args, **options)
-        except RuntimeError as error:
-            if not solver_failed(error):
-                raise
-            return fail(error)
+        with alone():
+            try:
+                return command(*args, **options)
+            except KeyboardInterrupt as error:
+                complain(str(error) or interruption())
+                return INTERRUPTED
+            except RuntimeError as error:
+                from verification.algorithm.monolithic import SolveError
+                from verification.contact import ContactError  # numpy: only now
+
+                if not isinstance(error, (ContactError, SolveError)):
+                    raise
+                return fail(error)
 
     return run
-
-
-def solver_failed(error: RuntimeError) -> bool:
-    """True for errors of the solvers of step II and of the global method."""
-    from verification.algorithm.monolithic import SolveError
-    from verification.contact import ContactError  # numpy: only now
-
-    return isinstance(error, (ContactError, SolveError))

@@ -7,6 +7,7 @@ import json
 import click
 
 from verification.cli.console import say
+from verification.cli.forms import cli
 
 
 def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
@@ -15,7 +16,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     return [name for name in names() if name.startswith(begun)]
 
 
-@click.command()
+@cli.command()
 @click.argument("name", required=False, shell_complete=_names)
 def schema(name: str | None) -> None:
     """List the documents of all commands, or print one JSON Schema.

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
-
 from verification.cli.console import deliver, stages
-from verification.cli.options import FILE, JSON, SET, SWAP, check_place, one_file
-from verification.cli.problems import load_problem
+from verification.cli.forms import cli
+from verification.cli.options import JSON, SWAP, Typed, of_a_file, one_file
+from verification.cli.problems import load
 
 
-@click.command()
-@FILE
-@SET
-@SWAP
+@cli.command()
+@of_a_file(SWAP)
 @one_file(".html", words="Page to write", required=True)
 @JSON
-def explore(file: Path, keys: dict[str, str], swap: bool, target: Path, as_json: bool) -> None:
+def explore(typed: Typed, target: Path, as_json: bool) -> None:
     """Write a page of FILE with sliders for theta and friction.
 
     The page is one HTML file that needs no network.  It shows both bodies step by step, the residual, and the plane of
@@ -32,15 +29,10 @@ def explore(file: Path, keys: dict[str, str], swap: bool, target: Path, as_json:
     """
     from verification.exploration import page
     from verification.exploration.sections import sections
-    from verification.output.files import staged
+    from verification.output.files import writing
 
-    problem = load_problem(file, keys, swap=swap)
-    check_place(target)
+    problem = load(typed)
     with stages() as tell:
         found = page.explore(problem, progress=tell)
-
-    def write(shown: page.Exploration) -> None:
-        with staged(target.parent, shown=target) as room:
-            (room / target.name).write_text(shown.page(), encoding="utf-8")
-
+    write = writing(target, lambda shown, path: path.write_text(shown.page(), encoding="utf-8"))
     deliver(found, lambda shown: sections(shown, target), as_json, write, target)

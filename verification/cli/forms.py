@@ -1,4 +1,4 @@
-"""Groups of commands: an unknown name gets the nearest one as a suggestion, and one command may be the default."""
+"""The group of all commands, which each adds itself to; a group with a command that needs no name."""
 
 from __future__ import annotations
 
@@ -8,11 +8,20 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+import ndtheory
 from ndtheory.texts import did_you_mean
+from verification.cli.console import guarded
 
 
 class Commands(click.Group):
-    """A group that suggests the nearest name for an unknown one."""
+    """A group that guards its commands, and suggests the nearest name for an unknown one."""
+
+    def add_command(self, cmd: click.Command, name: str | None = None) -> None:
+        """Add a command, or a group with all its forms."""
+        for form in cmd.forms().values() if isinstance(cmd, AdviseGroup) else [cmd]:
+            assert form.callback is not None
+            form.callback = guarded(form.callback)
+        super().add_command(cmd, name)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -136,3 +145,19 @@ def _first_word(command: click.Command, args: Sequence[str]) -> int | None:
         )
         place += 2 if valued else 1
     return None
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80})
+@click.version_option(ndtheory.__version__, prog_name="ndtheory", message="%(prog)s %(version)s")
+def cli() -> None:
+    """The convergence theorem of Bayada, Sabil and Sassi for Neumann-Dirichlet contact iterations.
+
+    Bounds, measured constants, the iteration itself, and one verdict for each bound.
+
+    \b
+    ndtheory demo                     the Section 6 model, end to end
+    ndtheory example section6 > my.toml
+    ndtheory compare my.toml          the same for a problem of your own
+    ndtheory advise my.toml           which body first, which theta
+    ndtheory verify                   every statement of the paper, checked
+    """

@@ -10,11 +10,12 @@ import click
 
 from ndtheory.statements import proof_of, statements
 from ndtheory.texts import nearest
-from verification.cli.console import Interrupted, complain, deliver, say, stages
-from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf, check_place, one_file
+from verification.cli.console import complain, deliver, say, stages
+from verification.cli.forms import cli
+from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf, one_file
 
 
-@click.command()
+@cli.command()
 @click.argument("ids", nargs=-1, metavar="[ID]...")
 @click.option(
     "--level",
@@ -44,11 +45,9 @@ def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path |
       ndtheory verify thm-5.9 --map proof.svg
     """
     chosen = [one for id in ids for one in _named(id)]
-    if target is not None:
-        check_place(target, "--map")
-        if not (level or folder or as_json):
-            say(_draw(target, chosen, {}))
-            return 0
+    if target is not None and not (level or folder or as_json):
+        say(_draw(target, chosen, {}))
+        return 0
     from verification.ledger import verify as check
     from verification.ledger.sections import sections
     from verification.output.folder import Folder
@@ -58,8 +57,7 @@ def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path |
         with stages() as watch:
             found = check(chosen, level=level or "quick", watch=watch)
     except KeyboardInterrupt:
-        complain("interrupted before every check was done: no verdict is reached")
-        raise Interrupted from None
+        raise KeyboardInterrupt("interrupted before every check was done: no verdict is reached") from None
     deliver(found, sections, as_json, write, folder)
     if target is not None:
         drawn = _draw(target, chosen, {row.statement.id: row.verdict for row in found.rows})
@@ -73,17 +71,16 @@ def _draw(target: Path, ids: list[str], found: Mapping[str, str]) -> str:
     from ndtheory.statements import recorded
     from verification import build, example, measure
     from verification.figures import draw_map
-    from verification.output.files import staged
+    from verification.output.files import write_into
     from verification.semidefinite.losses import locate
 
     problem, verdicts = example("section6"), recorded() | dict(found)
     with stages() as watch:
         pair = build(problem)
         losses = locate(pair, measure(pair), progress=watch)
-        with staged(target.parent, shown=target) as room:
-            of = f"{problem.title}, in {problem.units['stress']}"
-            text = draw_map(ids, losses=losses, of=of, verdicts=verdicts)
-            (room / target.name).write_text(text, encoding="utf-8")
+        of = f"{problem.title}, in {problem.units['stress']}"
+        text = draw_map(ids, losses=losses, of=of, verdicts=verdicts)
+        write_into(target, lambda path: path.write_text(text, encoding="utf-8"))
     shown = [verdicts.get(id, "INCONCLUSIVE") for id in proof_of(ids or statements())]
     counts = ", ".join(f"{shown.count(verdict)} {verdict}" for verdict in dict.fromkeys(shown))
     source = f"{len(found)} as found now, others as recorded" if found else "with their recorded verdicts"
@@ -107,7 +104,7 @@ def _named(id: str) -> list[str]:
 NAMES = ("fig5", "fig10", "fig11", "fig12", "all")
 
 
-@click.command()
+@cli.command()
 @click.argument("figure", type=OneOf(NAMES))
 @JOBS
 @STORE

@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from verification.cli.console import complain, deliver, stages
-from verification.cli.options import FOLDER, JSON, OneOf, Typed, of_a_run
-from verification.cli.problems import complain_of, load_problem, warn
+from verification.cli.forms import cli
+from verification.cli.options import FOLDER, JSON, RUN, OneOf, Typed, of_a_file
+from verification.cli.problems import complain_of, load, warn
 
 if TYPE_CHECKING:
     from verification.algorithm.history import Increment
 
 
-@click.command()
-@of_a_run
+@cli.command()
+@of_a_file(*RUN)
 @click.option(
     "--method",
     type=OneOf(["iteration", "monolithic"]),
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 )
 @FOLDER
 @JSON
-def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bool, **changes: Any) -> int:
+def march(typed: Typed, solver: Any, method: Any, folder: Path | None, as_json: bool) -> int:
     """Follow the loading history of FILE, increment by increment.
 
     The [[step]] tables of FILE have the loads.  Friction measures slip from the end of the last increment, so that it
@@ -39,7 +40,7 @@ def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bo
       ndtheory march my.toml -o results
       ndtheory march my.toml --method monolithic --json
     """
-    problem = load_problem(file, **changes)
+    problem = load(typed)
     from verification.algorithm import history
     from verification.algorithm.runs import Run
     from verification.output.folder import Folder
@@ -60,12 +61,12 @@ def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bo
         except KeyboardInterrupt:  # costs no increment
             found = replace(found, interrupted=True)
     warn(found.warnings)
-    deliver(found, sections, as_json, write, folder, typing=Typed(file=file, folder=folder, **changes).command)
+    deliver(found, sections, as_json, write, folder, typing=replace(typed, folder=folder).command)
     if found.ended or found.interrupted:
         complain(f"{found.ended or 'interrupted after the last increment'}: what was computed is kept")
     last = found.increments[-1].result
     if found.interrupted:
         return 130
     if isinstance(last, Run):
-        complain_of(last, changes["swap"])
+        complain_of(last, typed.swap)
     return 0 if found.converged and not found.proved_violated else 1

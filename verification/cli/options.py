@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from shlex import quote
 from typing import Any, TypeVar
@@ -16,7 +17,8 @@ from verification.show.parts import Next
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-FILE = click.argument("file", type=click.Path(path_type=Path))
+PATH = click.Path(path_type=Path)
+FILE = click.argument("file", type=PATH)
 JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 
 
@@ -87,13 +89,6 @@ SOLVER = click.option(
 )
 
 
-def of_a_run(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command FILE and what changes its run."""
-    for option in reversed((FILE, SET, THETA, RELAXATION, SWAP, SOLVER)):
-        command = option(command)
-    return command
-
-
 def folder_name(context: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
     """The folder of ``-o``; an empty name is refused."""
     if value == "":
@@ -104,18 +99,29 @@ def folder_name(context: click.Context, parameter: click.Parameter, value: str |
 def one_file(
     *endings: str, words: str, required: bool = False, names: Sequence[str] = ("-o", "--output")
 ) -> Callable[[F], F]:
-    """The option ``-o``, or another, of a command that makes one file, with a name that ends in one of these."""
+    """The option ``-o``, or another, of a command that makes one file, with a name that ends in one of these.
+
+    It is refused at once where it cannot be written, or another program has written it.
+    """
     needed = f"a name ending in {' or '.join(endings)}"
 
     def named(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
-        if value is not None and value.suffix not in endings:
+        if value is None or context.resilient_parsing:
+            return value
+        if value.suffix not in endings:
             raise click.BadParameter(f"{str(value)!r}: needed {needed}", context, parameter)
+        from verification.output.files import check_ours
+        from verification.problem.tables import ProblemError
+
+        if not value.parent.is_dir():
+            raise ProblemError(str(value), "", None, f"needed a name in a folder that exists ({parameter.opts[0]})")
+        check_ours(value, parameter.opts[0])
         return value
 
     return click.option(
         *names,
         "target",
-        type=click.Path(path_type=Path),
+        type=PATH,
         callback=named,
         required=required,
         metavar=f"FILE{endings[0]}",
@@ -123,24 +129,12 @@ def one_file(
     )
 
 
-def check_place(target: Path, option: str = "-o") -> None:
-    """Raise ProblemError for a file that cannot be written, or that another program has written."""
-    from verification.output.files import check_ours
-    from verification.problem.tables import ProblemError
-
-    if not target.parent.is_dir():
-        raise ProblemError(str(target), "", None, f"needed a name in a folder that exists ({option})")
-    check_ours(target, option)
-
-
 FOLDER = click.option("-o", "--output", "folder", callback=folder_name, metavar="DIR", help="Folder for the results.")
 
 JOBS = click.option(
     "--jobs", type=click.IntRange(1), metavar="N", help="Number of processes; one for each core by default."
 )
-STORE = click.option(
-    "--store", type=click.Path(path_type=Path), metavar="STORE", help="File that keeps the rows of runs (SQLite)."
-)
+STORE = click.option("--store", type=PATH, metavar="STORE", help="File that keeps the rows of runs (SQLite).")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,3 +174,24 @@ class Typed:
         """The file, with ./ before what could be read as an option or as the name of a command."""
         name = str(self.file)
         return f"./{name}" if name.startswith("-") or (self.file.name == name and not self.file.suffix) else name
+
+
+def of_a_file(*options: Callable[[Any], Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give a command FILE, --set and more options that change its problem; it gets them as one Typed."""
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def run(**given: Any) -> Any:
+            names = [each.name for each in fields(Typed) if each.name != "folder" and each.name in given]
+            return command(Typed(**{name: given.pop(name) for name in names}), **given)
+
+        changed: Callable[..., Any] = run
+        for option in reversed((FILE, SET, *options)):
+            changed = option(changed)
+        return changed
+
+    return decorate
+
+
+#: The options that change the run of a problem.
+RUN = (THETA, RELAXATION, SWAP, SOLVER)

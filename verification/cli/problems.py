@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import click
 
 from ndtheory.keys import key
-from verification.cli.console import Interrupted, complain, deliver, one_by_one, progress, remember, say, stages
-from verification.cli.options import FILE, FOLDER, JSON, SET, SWAP, Typed, folder_name, of_a_run
+from verification.cli.console import complain, deliver, one_by_one, progress, remember, say, stages
+from verification.cli.forms import cli
+from verification.cli.options import FOLDER, JSON, PATH, RUN, SWAP, Typed, folder_name, of_a_file
 from verification.document import Document
 
 if TYPE_CHECKING:
@@ -53,11 +54,11 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     return [name for name in examples() if name.startswith(begun)]
 
 
-@click.command()
+@cli.command()
 @click.argument("name", required=False, shell_complete=_names)
 @click.option(
     "--inputs",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FOLDER",
     help="Write a file for each command that reads one: problems, a sweep, matrices, vectors and a log of a run.",
 )
@@ -70,35 +71,29 @@ def example(name: str | None, inputs: Path | None, as_json: bool) -> None:
       ndtheory example section6 > my.toml
       ndtheory example --inputs trial
     """
-    written: Mapping[str, str] = {}
+    available, context = examples(), click.get_current_context()
+    if name is not None and inputs is not None:
+        raise click.UsageError(f"received {name} and --inputs: needed one of them", context)
     if inputs is not None:
-        if name is not None:
-            raise click.UsageError(f"received {name} and --inputs: needed one of them", click.get_current_context())
         from verification.output.inputs import INPUTS, write_inputs
 
         with stages() as tell:
             tell("computing a run", None)
             write_inputs(inputs)
         written = {str(inputs / file): what for file, what in INPUTS.items()}
-    available = examples()
-    if name is not None and name not in available:
+        found, shown = Examples(written=written), [f"{file}: {what}" for file, what in written.items()]
+        shown.append(f"\nNext: ndtheory compare {quote(str(inputs / 'my.toml'))}")
+    elif name is None:
+        titles = {key: _title(text) for key, text in available.items()}
+        found, shown = Examples(examples=titles), [f"  {key:14}  {title}" for key, title in titles.items()]
+        shown.append("\nNext: ndtheory example section6 > ex.toml; ndtheory compare ex.toml")
+    elif name in available:
+        found, shown = Examples(name=name, toml=available[name]), [available[name].rstrip()]
+    else:
         from verification.problem.examples import unknown_example
 
-        raise click.UsageError(unknown_example(name, available), click.get_current_context())
-    titles = {key: _title(text) for key, text in available.items()}
-    if as_json:
-        listed = Examples(examples=titles) if name is None else Examples(name=name, toml=available[name])
-        say((Examples(written=written) if written else listed).to_json())
-    elif written:
-        for file, what in written.items():
-            say(f"{file}: {what}")
-        say(f"\nNext: ndtheory compare {quote(str((inputs or Path()) / 'my.toml'))}")
-    elif name is None:
-        for key, title in titles.items():
-            say(f"  {key:14}  {title}")
-        say("\nNext: ndtheory example section6 > ex.toml; ndtheory compare ex.toml")
-    else:
-        say(available[name].rstrip())
+        raise click.UsageError(unknown_example(name, available), context)
+    say(found.to_json() if as_json else "\n".join(shown))
 
 
 def _title(text: str) -> str:
@@ -111,11 +106,12 @@ def load_problem(
     file: Path, keys: Mapping[str, str], *, theta: str | None = None, relaxation: str | None = None, swap: bool = False
 ) -> Problem:
     """The problem of a file, changed by the options: first --set, then the others."""
-    from verification.problem import ProblemError, load
+    from verification.problem import ProblemError
+    from verification.problem import load as read
     from verification.problem.reading import takes_theta
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
-    problem = load(file).with_keys({**keys, **chosen})
+    problem = read(file).with_keys({**keys, **chosen})
     if theta is not None:
         rule = problem.iteration.relaxation
         if not takes_theta(rule):
@@ -125,14 +121,17 @@ def load_problem(
     return remember(problem.swapped() if swap else problem)
 
 
-@click.command()
-@FILE
-@SET
-@SWAP
+def load(typed: Typed) -> Problem:
+    """The problem as it was typed."""
+    return load_problem(typed.file, typed.keys, theta=typed.theta, relaxation=typed.relaxation, swap=typed.swap)
+
+
+@cli.command()
+@of_a_file(SWAP)
 @click.option("--refine", type=click.IntRange(0, 8), default=0, metavar="N", help="Also on meshes halved 1 to N times.")
 @click.option("--verified", is_flag=True, help="Prove bounds of each constant, for the exact data of FILE on its mesh.")
 @JSON
-def constants(file: Path, keys: dict[str, str], swap: bool, refine: int, verified: bool, as_json: bool) -> None:
+def constants(typed: Typed, refine: int, verified: bool, as_json: bool) -> None:
     """Measure m, M, C_R, C_s, C_tr, C_K and rho on the mesh of FILE.
 
     m, M and C_K come in the file's unit of stress.
@@ -146,21 +145,20 @@ def constants(file: Path, keys: dict[str, str], swap: bool, refine: int, verifie
     from verification.constants import measure
     from verification.sections.constants import sections
 
-    problem = load_problem(file, keys, swap=swap)
+    problem = load(typed)
     with stages() as tell:
         measured = measure(problem, refine=refine, verified=verified, progress=tell)
-    deliver(measured, sections, as_json, typing=Typed(file=file, keys=keys, swap=swap).command)
+    deliver(measured, sections, as_json, typing=typed.command)
     if "levels" in measured.reason:
-        complain(f"{measured.reason['levels']}: what was computed is shown")
-        raise Interrupted
+        raise KeyboardInterrupt(f"{measured.reason['levels']}: what was computed is shown")
 
 
-@click.command()
-@of_a_run
-@click.option("--start", type=click.Path(path_type=Path), metavar="g.npy", help="Begin with the forces of this file.")
+@cli.command()
+@of_a_file(*RUN)
+@click.option("--start", type=PATH, metavar="g.npy", help="Begin with the forces of this file.")
 @FOLDER
 @JSON
-def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_json: bool, **changes: Any) -> int:
+def run(typed: Typed, solver: Any, start: Path | None, folder: Path | None, as_json: bool) -> int:
     """Run the Neumann-Dirichlet iteration on FILE.
 
     Exit 0 where it converged, 1 where it did not, 130 after Ctrl-C (what was computed is shown and written).
@@ -171,7 +169,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
       ndtheory run my.toml --set contact.friction=0.4 --relaxation newton
       ndtheory run my.toml --start g.npy
     """
-    problem = load_problem(file, **changes)  # before what loads arrays: a file may be missing
+    problem = load(typed)  # before what loads arrays: a file may be missing
     from verification.algorithm import runs
     from verification.algorithm.start import forces
     from verification.coupling.matrix_files import read_vector
@@ -191,16 +189,15 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
         except KeyboardInterrupt:  # costs no run
             finished = replace(finished, interrupted=True).linearise()
     warn(finished.warnings[len(pair.warnings) :])
-    deliver(finished, sections, as_json, write, folder, typing=Typed(file=file, **changes).command)
-    return _status_of_run(finished, changes["swap"])
+    deliver(finished, sections, as_json, write, folder, typing=typed.command)
+    return _status_of_run(finished, typed.swap)
 
 
-@click.command()
-@FILE
-@SET
+@cli.command()
+@of_a_file()
 @FOLDER
 @JSON
-def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) -> int:
+def solve(typed: Typed, folder: Path | None, as_json: bool) -> int:
     """Solve both bodies of FILE at once, without decomposition.
 
     The global method: it shares nothing with the iteration but the matrices.  One body may be rigid (shape = "rigid"),
@@ -217,7 +214,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
     from verification.output.folder import Folder
     from verification.sections import run
 
-    problem = load_problem(file, keys)
+    problem = load(typed)
     write = None if folder is None else Folder(folder, "solve").write
     bodies = discretise(problem)
     warn(bodies.warnings)
@@ -225,7 +222,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
     warn(solution.warnings[len(bodies.warnings) :])
-    deliver(solution, run.solution, as_json, write, folder, typing=Typed(file=file, keys=keys, folder=folder).command)
+    deliver(solution, run.solution, as_json, write, folder, typing=replace(typed, folder=folder).command)
     return 0
 
 
@@ -238,8 +235,8 @@ def _bounds(context: click.Context, parameter: click.Parameter, value: str | Non
         raise click.BadParameter(str(error), context, parameter) from None
 
 
-@click.command()
-@of_a_run
+@cli.command()
+@of_a_file(*RUN)
 @click.option(
     "--exact", is_flag=True, help="Tighten the semidefinite bound to within 0.1 % of a factor that some loads attain."
 )
@@ -253,14 +250,7 @@ def _bounds(context: click.Context, parameter: click.Parameter, value: str | Non
 @FOLDER
 @JSON
 def compare(
-    file: Path,
-    solver: Any,
-    exact: bool,
-    verified: bool,
-    bounds: tuple[str, ...] | None,
-    folder: Path | None,
-    as_json: bool,
-    **changes: Any,
+    typed: Typed, folder: Path | None, solver: Any, as_json: bool, bounds: tuple[str, ...] | None, **asked: Any
 ) -> int:
     """Measure constants, evaluate bounds, run, and judge each bound.
 
@@ -274,17 +264,16 @@ def compare(
       ndtheory compare my.toml --verified
       ndtheory compare my.toml --bounds printed,repaired,energy
     """
-    if exact and bounds is not None:
+    if asked["exact"] and bounds is not None:
         from verification.registry import BOUNDS
 
         if all(BOUNDS[name].calculated for name in bounds):
             needed = "needed a bound among them that can be brought closer"
             raise click.UsageError(f"received --exact with --bounds {','.join(bounds)}: {needed}")
-    problem, typed = load_problem(file, **changes), Typed(file=file, **changes)
-    return _compare(problem, typed, folder, solver, as_json, exact=exact, verified=verified, bounds=bounds)
+    return _compare(load(typed), typed, folder, solver, as_json, bounds=bounds, **asked)
 
 
-@click.command()
+@cli.command()
 @click.option(
     "-o",
     "--output",
@@ -306,10 +295,9 @@ def demo(folder: Path, as_json: bool) -> int:
       ndtheory demo -o section6
     """
     from verification.output.folder import Folder
-    from verification.problem import load
 
-    written = Folder(folder, "compare").write_problem(examples()["section6"])
-    status = _compare(load(written), Typed(file=written), folder, "auto", as_json)
+    typed = Typed(file=Folder(folder, "compare").write_problem(examples()["section6"]))
+    status = _compare(load(typed), typed, folder, "auto", as_json)
     for line in [] if as_json else unreached():
         complain(line)
     return status
@@ -333,9 +321,10 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
     return _status_of_comparison(comparison, typed.swap)
 
 
-def warn(warnings: list[str]) -> None:
+def warn(warnings: Sequence[str], lead: str = "warning: ") -> None:
+    """Report sentences, one a line."""
     for warning in warnings:
-        complain(f"warning: {warning}")
+        complain(lead + warning)
 
 
 def _status_of_run(finished: Run, swapped: bool) -> int:
@@ -366,19 +355,12 @@ def complain_of(finished: Run, swapped: bool) -> None:
 
 
 def unreached() -> list[str]:
-    """Messages for a user whose shell does not find the command that was started by the name ``ndtheory``.
-
-    Empty if it does, or if the program was started in another way.
-    """
-    started = Path(sys.argv[0])
-    if started.name != "ndtheory" or not started.exists():
+    """Messages for a user whose shell does not find the command that was started by the name ``ndtheory``."""
+    started, found = Path(sys.argv[0]), shutil.which("ndtheory")
+    if started.name != "ndtheory" or not started.exists() or (found and os.path.samefile(found, started)):
         return []
-    found = shutil.which("ndtheory")
-    if found is not None and os.path.samefile(found, started):
-        return []
-    near = os.path.relpath(started) if started.absolute().is_relative_to(Path.cwd()) else str(started)
-    activate = os.path.join(os.path.dirname(near), "activate")
-    said = [f"`ndtheory` is not on the PATH of this shell: type {quote(near)} for it"]
-    if os.path.exists(activate):
-        said.append(f"or, once in each shell: source {quote(activate)}")
+    near = Path(os.path.relpath(started)) if started.absolute().is_relative_to(Path.cwd()) else started
+    said = [f"`ndtheory` is not on the PATH of this shell: type {quote(str(near))} for it"]
+    if near.with_name("activate").exists():
+        said.append(f"or, once in each shell: source {quote(str(near.with_name('activate')))}")
     return said

@@ -7,15 +7,18 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from ndtheory.texts import printable
-from verification.cli.console import Interrupted, complain, deliver, stages
-from verification.cli.options import FILE, FOLDER, JOBS, JSON, SET, STORE, SWAP, Typed, check_place, one_file
-from verification.cli.problems import load_problem
+from verification.cli.console import complain, deliver, stages
+from verification.cli.forms import cli
+from verification.cli.options import FILE, FOLDER, JOBS, JSON, PATH, STORE, SWAP, Typed, of_a_file, one_file
+from verification.cli.problems import load, warn
+from verification.problem.tables import ProblemError, unreadable
 
 if TYPE_CHECKING:
     from verification.machine.progress import Progress
@@ -42,7 +45,7 @@ def _axes(context: click.Context, parameter: click.Parameter, given: tuple[str, 
     return plots
 
 
-@click.command()
+@cli.command()
 @FILE
 @JOBS
 @click.option("--dask", metavar="ADDRESS", help="A dask scheduler whose workers run, as tcp://host:8786.")
@@ -50,13 +53,11 @@ def _axes(context: click.Context, parameter: click.Parameter, given: tuple[str, 
 @click.option("--fresh", is_flag=True, help="Make all rows again, those in the store too.")
 @click.option("--retry", is_flag=True, help="Make those rows of the store again that ended in an error.")
 @click.option("--dry-run", is_flag=True, help="Say how many runs there are and how many the store has; run nothing.")
-@click.option(
-    "--export", type=click.Path(path_type=Path), metavar="DIR", help="Write NAME.csv and NAME.nc (netCDF) into DIR."
-)
+@click.option("--export", type=PATH, metavar="DIR", help="Write NAME.csv and NAME.nc (netCDF) into DIR.")
 @click.option(
     "--plot", "plots", multiple=True, callback=_axes, metavar="X,Y[,CURVES]", help="Draw column Y over X as SVG."
 )
-@click.option("--log", type=click.Path(path_type=Path), metavar="LOG", help="Append lines about progress to this file.")
+@click.option("--log", type=PATH, metavar="LOG", help="Append lines about progress to this file.")
 @FOLDER
 @JSON
 def sweep(
@@ -112,17 +113,18 @@ def sweep(
     if dry_run:
         planned = plan(problem, grid, kept, fresh=fresh, retry=retry)
         deliver(planned, shown.plan, as_json)
-        _tell(planned.notes)
+        warn(planned.notes, "")
         return
     targets = _targets(file.stem, target, plots, export)
-    _check_log(log, [kept, *targets])
+    if log is not None:
+        _check_log(log, [kept, *targets])
     for one in targets:
         check_folder(one.parent, " (--export)" if one.parent == export else " (-o)")
         check_ours(one)
     with _progress(log) as tell:
         work = work_of(jobs or -1, dask)
         found = sweep_grid(problem, grid, work=work, store=kept, fresh=fresh, retry=retry, progress=tell)
-    _tell(found.notes)
+    warn(found.notes, "")
     if found.stored:
         complain(f"{kept}: {found.stored} of {found.asked} rows were there")
     sections = lambda found: shown.sections(found, target)
@@ -135,8 +137,7 @@ def sweep(
         typing=Typed(file=Path(problem.source)).command,
     )
     if found.interrupted:
-        complain(f"{found.reason['rows']}: those are in {target}; the same command goes on from there")
-        raise Interrupted
+        raise KeyboardInterrupt(f"{found.reason['rows']}: those are in {target}; the same command goes on from there")
 
 
 def _targets(
@@ -163,75 +164,60 @@ def _targets(
 
 def _write(found: Sweep, targets: dict[Path, Callable[[Sweep, Path], None]]) -> None:
     """Write each file; a figure that cannot be drawn is reported, and the others are written."""
-    from verification.output.files import staged
+    from verification.output.files import write_into
 
     for path, write in targets.items():
-        with staged(path.parent, shown=path) as place:
-            try:
-                write(found, place / path.name)
-            except ValueError as error:
-                if path.suffix != ".svg":
-                    raise
-                complain(f"{path} is not drawn: {error}")
+        try:
+            write_into(path, partial(write, found))
+        except ValueError as error:
+            if path.suffix != ".svg" or isinstance(error, ProblemError):
+                raise
+            complain(f"{path} is not drawn: {error}")
 
 
-def _check_log(log: Path | None, others: Sequence[Path]) -> None:
+def _check_log(log: Path, others: Sequence[Path]) -> None:
     """Raise ProblemError for a log that is neither new, nor empty, nor written by this command."""
-    from verification.problem.tables import ProblemError, unreadable
-
-    if log is None:
-        return
-    refuse = lambda needed: ProblemError(str(log), "", None, f"{needed} (--log)")
-    if log.absolute() in [other.absolute() for other in others]:
-        raise refuse("needed a separate file for the log")
-    if not log.exists():
-        return
-    if why := unreadable(log, MOST_LOG_BYTES):
-        raise refuse(why)
-    try:
-        with log.open("rb") as there:
-            first = there.readline(200)
-    except OSError as error:
-        raise refuse(f"cannot be read: {error.strerror}") from None
-    if first and not LOG.match(first):
-        raise refuse("needed a new file, an empty one or a log of a sweep; this file is left as it is")
+    needed = ""
+    if not log.parent.is_dir():
+        needed = "a name in a folder that exists"
+    elif log.absolute() in [other.absolute() for other in others]:
+        needed = "a separate file for the log"
+    elif log.exists() and not _is_log(log):
+        needed = "a new file, an empty one or a log of a sweep; this file is left as it is"
+    if needed:
+        raise ProblemError(str(log), "", None, f"needed {needed} (--log)")
 
 
-def _tell(notes: tuple[str, ...]) -> None:
-    for note in notes:
-        complain(note)
+def _is_log(path: Path) -> bool:
+    if unreadable(path, MOST_LOG_BYTES):
+        return False
+    with path.open("rb") as there:
+        first = there.readline(200)
+    return not first or bool(LOG.match(first))
 
 
 @contextlib.contextmanager
 def _progress(log: Path | None) -> Iterator[Progress]:
     """Progress as one live line on a terminal, as lines with the time in a log and on another stderr."""
-    from verification.problem.tables import ProblemError
-
     with contextlib.ExitStack() as stack:
-        tell = stack.enter_context(stages())
-        lines: Progress | None = None
+        tellers = [stack.enter_context(stages())]
         if log is not None:
-            try:
-                stream = stack.enter_context(log.open("a", encoding="utf-8"))
-            except (OSError, ValueError) as error:
-                why = getattr(error, "strerror", None) or error
-                raise ProblemError(str(log), "", None, f"needed a file to write to (--log): {why}") from None
+            stream = stack.enter_context(log.open("a", encoding="utf-8"))
 
             def write(line: str) -> None:
                 with contextlib.suppress(OSError):  # a full disk: the rows matter more
                     stream.write(printable(line) + "\n")
                     stream.flush()
 
-            lines = every(IN_LOG, write, at_once=True)
+            tellers.append(every(IN_LOG, write, at_once=True))
         elif not sys.stderr.isatty():
-            lines = every(ON_STDERR, complain)
+            tellers.append(every(ON_STDERR, complain))
 
-        def both(what: str, share: float | None) -> None:
-            tell(what, share)
-            if lines is not None:
-                lines(what, share)
+        def tell(what: str, share: float | None) -> None:
+            for each in tellers:
+                each(what, share)
 
-        yield both
+        yield tell
 
 
 def every(
@@ -250,14 +236,12 @@ def every(
     return tell
 
 
-@click.command()
-@FILE
-@SET
-@SWAP
+@cli.command()
+@of_a_file(SWAP)
 @one_file(".svg", ".png", words="File to draw", required=True)
 @STORE
 @JSON
-def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Path | None, as_json: bool) -> None:
+def region(typed: Typed, target: Path, store: Path | None, as_json: bool) -> None:
     """Draw over theta and k where each bound proves contraction.
 
     The regions are those of all bounds for the bodies of FILE; points show how runs end.  Both axes are logarithmic;
@@ -269,18 +253,14 @@ def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Pa
       ndtheory region my.toml --set body2.young=7e4 -o stiff.svg
     """
     from verification import figures
-    from verification.output.files import staged
+    from verification.output.files import writing
     from verification.sweeps.region import chart
     from verification.sweeps.sections import plane as sections
 
-    problem = load_problem(file, keys, swap=swap)
-    check_place(target)
+    problem = load(typed)
     with stages() as tell:
         plane = chart(problem, store=store, progress=tell)
-    deliver(plane, lambda found: sections(found, target), as_json)
-    with stages() as tell, staged(target.parent, shown=target) as room:
-        tell("drawing", None)
-        figures.save(figures.draw_region(plane), room / target.name)
+    write = writing(target, lambda plane, path: figures.save(figures.draw_region(plane), path))
+    deliver(plane, lambda found: sections(found, target), as_json, write, target)
     if plane.interrupted:
-        complain(f"{plane.reason['points']}: what was computed is drawn")
-        raise Interrupted
+        raise KeyboardInterrupt(f"{plane.reason['points']}: what was computed is drawn")

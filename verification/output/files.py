@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import tempfile
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from verification.document import Document
 from verification.machine.interrupts import cleaned_up, undisturbed
-from verification.problem.tables import ProblemError, unreadable
+from verification.problem.tables import ProblemError
 
 try:
     import fcntl
-
-    LOCKS = True
-except ImportError:  # Windows: what a killed process leaves stays there
-    LOCKS = False
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 Kind = Literal["run", "solve", "march", "compare", "verify", "reproduce"]
 
@@ -65,9 +64,11 @@ MARKS = {
     ".toml": b"# ndtheory: the problem as it was computed",
 }
 
-
 #: No file of this program is larger, so that reading a file to look for its mark ends.
 MOST_BYTES = 500_000_000
+
+#: Files are written into a folder of such a name before they take their places.
+ROOM = ".ndtheory-writing-"
 
 
 def files_of(kind: Kind, folder: Path) -> tuple[str, ...]:
@@ -76,22 +77,22 @@ def files_of(kind: Kind, folder: Path) -> tuple[str, ...]:
     return (*FILES[kind], *series)
 
 
-def check_ours(target: Path, option: str = "-o") -> None:
-    """Raise ProblemError where writing would replace a file that this program has not written."""
-    check_place(target, option)
-    if _foreign(target) and _foreign(target):  # another process may just have replaced its own file
-        raise ProblemError(
-            str(target), "", None, f"not written by this program; needed another folder or name ({option})"
-        )
-
-
-def _foreign(target: Path) -> bool:
-    """Return True for a file that this program has not written, False where there is none."""
+def ours(target: Path) -> bool:
+    """Return True for a file that this program has written, and where there is none."""
     try:
-        marked = not unreadable(target, MOST_BYTES) and MARKS[target.suffix] in target.read_bytes()
+        there = target.stat()
+        readable = stat.S_ISREG(there.st_mode) and there.st_size <= MOST_BYTES
+        return readable and MARKS[target.suffix] in target.read_bytes()
     except FileNotFoundError:
-        return False
-    return not marked and target.exists()
+        return True
+
+
+def check_ours(target: Path, option: str = "-o") -> None:
+    """Raise ProblemError where writing would replace a folder, or a file that this program has not written."""
+    check_place(target, option)
+    if not ours(target):
+        needed = f"not written by this program; needed another folder or name ({option})"
+        raise ProblemError(str(target), "", None, needed)
 
 
 def check_folder(room: Path, option: str = "") -> None:
@@ -110,10 +111,6 @@ def check_place(target: Path, option: str = "-o") -> None:
         raise ProblemError(str(target), "", None, f"this is a folder: needed another folder or name ({option})")
 
 
-#: Files are written into a folder of such a name before they take their places.
-ROOM = ".ndtheory-writing-"
-
-
 @contextlib.contextmanager
 def staged(folder: Path, stale: Collection[str] = (), *, shown: Path | None = None) -> Iterator[Path]:
     """A folder to write into, whose files move into ``folder`` together at the end; after an error none does.
@@ -123,12 +120,8 @@ def staged(folder: Path, stale: Collection[str] = (), *, shown: Path | None = No
     nothing to replace.  A ProblemError names ``shown``, by default the folder.
     """
     try:
-        with cleaned_up(), contextlib.ExitStack() as stack:
-            with _held(folder):
-                _sweep(folder)
-                room = Path(tempfile.mkdtemp(prefix=ROOM, dir=folder))
-                stack.callback(_remove, room)
-                stack.enter_context(_held(room))
+        with cleaned_up(), tempfile.TemporaryDirectory(prefix=ROOM, dir=folder) as name:
+            room = Path(name)
             try:
                 yield room
             except KeyboardInterrupt:
@@ -141,60 +134,31 @@ def staged(folder: Path, stale: Collection[str] = (), *, shown: Path | None = No
 
 
 def _place(room: Path, folder: Path, pattern: str, stale: Collection[str] = ()) -> None:
-    """Move files where they belong."""
+    """Move files where they belong; one process at a time does so, where the system has locks."""
     names = sorted(path.name for path in room.glob(pattern))
-    with _held(folder), undisturbed():
+    with contextlib.ExitStack() as stack, undisturbed():
+        if fcntl is not None:
+            number = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, number)  # which ends the lock
+            with contextlib.suppress(OSError):  # some file systems have none
+                fcntl.flock(number, fcntl.LOCK_EX)
         for name in {*stale, *names}:
             (folder / name).unlink(missing_ok=True)
         for name in names:
             (room / name).replace(folder / name)
 
 
-@contextlib.contextmanager
-def _held(folder: Path) -> Iterator[None]:
-    """Lock a folder for this process; the system ends the lock with the process."""
-    if not LOCKS:
-        yield
-        return
-    number = os.open(folder, os.O_RDONLY)
-    try:
-        with contextlib.suppress(OSError):  # some file systems have no locks
-            fcntl.flock(number, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(number)
+def write_into(target: Path, write: Callable[[Path], object]) -> None:
+    """Write one file, whole or not at all."""
+    with staged(target.parent, shown=target) as room:
+        write(room / target.name)
 
 
-def _sweep(folder: Path) -> None:
-    """Remove what a killed process left: folders of ours that nobody holds, with nothing else in them."""
-    if not LOCKS:
-        return
-    for room in folder.glob(ROOM + "*"):
-        with contextlib.suppress(OSError):  # held, or no folder
-            number = os.open(room, os.O_RDONLY | os.O_DIRECTORY)
-            try:
-                fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if all(path.is_file() and path.suffix in MARKS for path in room.iterdir()):
-                    _remove(room)
-            finally:
-                os.close(number)
+def as_json(found: Document, path: Path) -> None:
+    """Write a result as its document."""
+    path.write_text(found.to_json(), encoding="utf-8")
 
 
-def _remove(room: Path) -> None:
-    """Remove a folder with the files in it."""
-    with contextlib.suppress(OSError):
-        for path in room.iterdir():
-            path.unlink()
-        room.rmdir()
-
-
-def writing(target: Path | None) -> Callable[[Document], None] | None:
-    """A function that writes a document into a file; None if no name was given."""
-    if target is None:
-        return None
-
-    def write(found: Document) -> None:
-        with staged(target.parent, shown=target) as room:
-            (room / target.name).write_text(found.to_json(), encoding="utf-8")
-
-    return write
+def writing(target: Path | None, write: Callable[[Any, Path], object] = as_json) -> Callable[[Any], None] | None:
+    """A function that writes a result into a file, as its document or by another way; None if no name was given."""
+    return None if target is None else lambda found: write_into(target, lambda path: write(found, path))

@@ -16,15 +16,16 @@ from verification.output.fields import write_fields, write_series
 from verification.output.files import (
     FILES,
     MARKS,
-    MOST_BYTES,
     Kind,
     check_folder,
     check_ours,
     check_place,
     files_of,
+    ours,
     staged,
+    write_into,
 )
-from verification.problem.tables import ProblemError, unreadable
+from verification.problem.tables import ProblemError
 from verification.spreadsheet import as_csv
 
 if TYPE_CHECKING:
@@ -56,11 +57,10 @@ class Folder:
     def write_problem(self, text: str) -> Path:
         """Write ``problem.toml``; ProblemError if an edited one is there, which is not overwritten."""
         target = self.path / "problem.toml"
-        if target.exists() and (target.is_dir() or not _replaceable(target.read_bytes(), text)):
+        if not ours(target) and target.read_bytes() != text.encode():
             needed = "differs from the built-in problem: needed another folder (-o), or run compare on this file"
             raise ProblemError(str(target), "", None, needed)
-        with staged(self.path, shown=target) as room:
-            (room / target.name).write_text(text, encoding="utf-8")
+        write_into(target, lambda path: path.write_text(text, encoding="utf-8"))
         return target
 
     def write(self, found: Any) -> None:
@@ -122,9 +122,7 @@ class Folder:
         _save(room, {view: draw_history(history, view) for view in ("loop", "states", "shear")})
 
     def _problem(self, room: Path, result: Document) -> None:
-        there = self.path / "problem.toml"
-        ours = not there.exists() or (not unreadable(there, MOST_BYTES) and MARKS[".toml"] in there.read_bytes())
-        if result.problem is not None and ours:
+        if result.problem is not None and ours(self.path / "problem.toml"):
             _text(room / "problem.toml", f"{MARKS['.toml'].decode()}\n{result.problem.to_toml()}")
 
 
@@ -144,11 +142,6 @@ def _pages(room: Path, ledger: Ledger) -> None:
     if ledger.whole:
         _text(room / "errata.md", sheets.errata(ledger))
         _text(room / "verdicts.json", sheets.verdicts(ledger))
-
-
-def _replaceable(there: bytes, text: str) -> bool:
-    """True if a problem file is the same as a text, or was written beside a result."""
-    return there == text.encode() or MARKS[".toml"] in there
 
 
 def _text(path: Path, text: str) -> None:
