@@ -49,8 +49,8 @@ FLOORS: dict[str, dict[str, str]] = {
     "constants": {"verification.constants": "__init__ cells measured measuring operators"},
     "iteration": {
         "verification.algorithm": (
-            "__init__ affine_piece ending fixed_point iterate linearisation monolithic rates reference relaxation "
-            "remedy runs start theta"
+            "__init__ affine_piece arrival fixed_point iterate linearisation loop monolithic rates reference "
+            "relaxation remedy runs start theta"
         )
     },
     "bounds": {"verification.bounds": "__init__ bound losses table verdicts"},

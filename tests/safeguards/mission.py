@@ -24,8 +24,9 @@ MISSION: dict[str, tuple[str, ...]] = {
         "ndtheory/energy_norms": "safeguards/energy_safe ndtheory/energy_norms ndtheory/energy_hypotheses",
         "ndtheory/number": "ndtheory/number ndtheory/enclosures",
         "verification/algorithm/affine_piece": "verification/jacobian verification/margin",
-        "verification/algorithm/ending": "verification/arrival verification/iteration",
+        "verification/algorithm/arrival": "verification/arrival verification/iteration",
         "verification/algorithm/fixed_point": "verification/lean_step verification/iteration verification/relaxation",
+        "verification/algorithm/loop": "verification/arrival verification/iteration",
         "verification/algorithm/linearisation": "verification/jacobian verification/prediction verification/margin",
         "verification/algorithm/rates": "safeguards/rates_safe verification/rates",
         "verification/algorithm/relaxation": "verification/relaxation verification/conformance",
@@ -69,7 +70,7 @@ EQUIVALENT: dict[str, dict[str, str]] = {
             "the last corner has an interval only if all have, and of no interval no end is rounded"
         )
     },
-    "verification/algorithm/ending.py": {
+    "verification/algorithm/loop.py": {
         "Ending.__init__: 0 -> 1": "the first residual is below infinity, which sets the count to 0"
     },
     "verification/semidefinite/lipschitz.py": {
