@@ -68,9 +68,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
     },
     "runs over grids": {
-        "verification.sweeps": (
-            "__init__ best_theta cluster course export grid region row sections store sweep workers"
-        )
+        "verification.sweeps": ("__init__ best_theta course export grid region row sections store sweep workers")
     },
     "couplings": {
         "verification.coupling": (
@@ -156,8 +154,8 @@ INSIDE = (
     ("verification.machine.threads", "threadpoolctl", "ledger records are read without it"),
     ("verification.sweeps.workers", "joblib", "heavy; only processes of one's own need it"),
     ("verification.sweeps.workers", "multiprocessing", "heavy; only processes of one's own need it"),
-    ("verification.sweeps.sweep", "verification.sweeps.cluster", "asyncio comes with it, and few have a cluster"),
-    ("verification.sweeps.cluster", "distributed", "an extra"),
+    ("verification.sweeps.workers", "asyncio", "few have a cluster"),
+    ("verification.sweeps.workers", "distributed", "an extra"),
     ("verification.sweeps.export", "xarray", "an extra"),
     ("verification.coupling.kratos", "KratosMultiphysics", "Kratos itself loads the module, and few have it"),
     ("fem1d2d.mesh_reader", "meshio", "heavy; the format of the file decides"),

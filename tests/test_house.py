@@ -21,7 +21,7 @@ DOORS = {
     "hypothesis": ("verification.testing",),
     "flint": ("verification.certificate", "fem1d2d.proofs.layers_proved"),
     "sqlite3": ("verification.sweeps.store",),
-    "distributed": ("verification.sweeps.cluster",),
+    "distributed": ("verification.sweeps.workers",),
     "xarray": ("verification.sweeps.export",),
     "KratosMultiphysics": ("verification.coupling.kratos",),
 }
