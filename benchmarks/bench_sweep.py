@@ -25,7 +25,8 @@ import verification as vf
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import SharedBodies, row
 from verification.sweeps.store import Store
-from verification.sweeps.sweep import sweep_grid, work_of
+from verification.sweeps.sweep import sweep_grid
+from verification.sweeps.workers import work_of
 
 #: Rows of a sweep on the mesh of 190 nodes along both bodies; more with --full.
 ROWS, MORE = (1_000,), (10_000,)

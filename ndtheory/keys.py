@@ -328,4 +328,4 @@ def named_type(hint: Any) -> tuple[str, type | None]:
         return "list of number", None
     if isinstance(hint, type) and issubclass(hint, Part):
         return (hint.part, None) if hint.part else ("object", hint)
-    return TYPES.get(hint, "free"), None
+    return TYPES.get(hint, "text" if isinstance(hint, type) and issubclass(hint, str) else "free"), None

@@ -47,8 +47,8 @@ FLOORS: dict[str, dict[str, str]] = {
     "constants": {"verification.constants": "__init__ cells measured measuring operators"},
     "iteration": {
         "verification.algorithm": (
-            "__init__ affine_piece ending fixed_point iterate linearisation monolithic rates reference relaxation "
-            "remedy runs start theta"
+            "__init__ affine_piece arrival fixed_point iterate linearisation loop monolithic rates reference "
+            "relaxation remedy runs start theta"
         )
     },
     "bounds": {"verification.bounds": "__init__ bound losses table verdicts"},
@@ -66,9 +66,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
     },
     "runs over grids": {
-        "verification.sweeps": (
-            "__init__ best_theta cluster course export grid region row sections store sweep workers"
-        )
+        "verification.sweeps": ("__init__ best_theta course export grid region row sections store sweep workers")
     },
     "couplings": {
         "verification.coupling": (
@@ -152,8 +150,8 @@ INSIDE = (
     ("verification.machine.threads", "threadpoolctl", "ledger records are read without it"),
     ("verification.sweeps.workers", "joblib", "heavy; only processes of one's own need it"),
     ("verification.sweeps.workers", "multiprocessing", "heavy; only processes of one's own need it"),
-    ("verification.sweeps.sweep", "verification.sweeps.cluster", "asyncio comes with it, and few have a cluster"),
-    ("verification.sweeps.cluster", "distributed", "an extra"),
+    ("verification.sweeps.workers", "asyncio", "few have a cluster"),
+    ("verification.sweeps.workers", "distributed", "an extra"),
     ("verification.sweeps.export", "xarray", "an extra"),
     ("verification.coupling.kratos", "KratosMultiphysics", "Kratos itself loads the module, and few have it"),
     ("fem1d2d.mesh_reader", "meshio", "heavy; the format of the file decides"),
@@ -176,7 +174,7 @@ DOORS = {
     "hypothesis": ("verification.testing",),
     "flint": ("verification.certificate", "fem1d2d.proofs.layers_proved"),
     "sqlite3": ("verification.sweeps.store",),
-    "distributed": ("verification.sweeps.cluster",),
+    "distributed": ("verification.sweeps.workers",),
     "xarray": ("verification.sweeps.export",),
     "KratosMultiphysics": ("verification.coupling.kratos",),
     **dict.fromkeys(EXECUTE, ()),

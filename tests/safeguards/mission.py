@@ -32,17 +32,18 @@ MISSION: dict[str, tuple[str, ...]] = {
         "ndtheory/energy_norms": "energy_safe energy_norms energy_hypotheses",
         "ndtheory/number": "number enclosures",
         "verification/algorithm/affine_piece": "jacobian margin",
-        "verification/algorithm/ending": "arrival iteration",
+        "verification/algorithm/arrival": "arrival iteration",
         "verification/algorithm/fixed_point": "lean_step iteration relaxation",
+        "verification/algorithm/loop": "arrival iteration",
         "verification/algorithm/linearisation": "jacobian prediction margin",
         "verification/algorithm/rates": "rates_safe rates",
         "verification/algorithm/relaxation": "relaxation conformance",
         "verification/algorithm/runs": "iteration results held_by_contact",
         "verification/semidefinite/conditions": "multipliers_safe lifted exact",
         "verification/semidefinite/interior_point": "interior_point exact",
-        "verification/semidefinite/lipschitz": ("mirror exact verified_comparison"),
-        "verification/semidefinite/multipliers": ("multipliers_safe multipliers exact"),
-        "verification/semidefinite/trace_forms": ("rounding_of_forms rounding_of_forms_in_friction"),
+        "verification/semidefinite/lipschitz": "mirror exact verified_comparison",
+        "verification/semidefinite/multipliers": "multipliers_safe multipliers exact",
+        "verification/semidefinite/trace_forms": "rounding_of_forms rounding_of_forms_in_friction",
         "verification/comparison": "compare_bounds verdicts first_numbers",
         "verification/constants/measuring": "constants energy_constants",
         "verification/constants/operators": "operators",
@@ -71,7 +72,7 @@ EQUIVALENT: dict[str, dict[str, str]] = {
             "the last corner has an interval only if all have, and of no interval no end is rounded"
         )
     },
-    "verification/algorithm/ending.py": {
+    "verification/algorithm/loop.py": {
         "Ending.__init__: 0 -> 1": "the first residual is below infinity, which sets the count to 0"
     },
     "verification/semidefinite/lipschitz.py": {

@@ -8,6 +8,7 @@ from problem_list import plates
 import verification as vf
 from ndtheory import Constants, EnergyConstants
 from ndtheory.statements import recorded, statements
+from verification.algorithm.loop import Outcome
 from verification.bounds.bound import Region, Subject
 from verification.bounds.table import Calculated
 from verification.certificate.continuum import certify_continuum
@@ -35,7 +36,7 @@ def with_steps(shown: vf.Problem) -> vf.Problem:
 
 def a_plane(shown: vf.Problem) -> Plane:
     region = Region(k=(0.1, 0.2), theta=((0.0, 0.5), (0.0, 0.4)), every=0.3, some=0.4)
-    points = (Point(theta=0.4, k=0.1, outcome="converged", iterations=12, coupled_residual=1e-9),)
+    points = (Point(theta=0.4, k=0.1, outcome=Outcome.CONVERGED, iterations=12, coupled_residual=1e-9),)
     return Plane(
         title="a plane",
         regions={"printed": region, "energy": region},

@@ -19,7 +19,7 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from ndtheory.keys import Part, derived, key, says
 from ndtheory.number import Numeric
-from verification.algorithm.ending import NO_FORCE
+from verification.algorithm.arrival import NO_FORCE
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.monolithic import Solution, SolveError, solve
 from verification.algorithm.rates import largest_step_ratio

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 from ndtheory.number import directed
-from verification.algorithm.ending import MOST, Outcome
+from verification.algorithm.arrival import MOST
 from verification.algorithm.iterate import Iterate
+from verification.algorithm.loop import Outcome
 from verification.algorithm.rates import CLEAR_OF_NOISE, ObservedRate, noise
 from verification.algorithm.relaxation import Rule
 from verification.constants import measure

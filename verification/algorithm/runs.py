@@ -16,10 +16,11 @@ from fem1d2d.mesh import Floats
 from ndtheory import Number
 from ndtheory.keys import Key, derived, key, says
 from ndtheory.number import Numeric
-from verification.algorithm.ending import LAST_ITERATE, NO_FORCE, Ending, Outcome, arrived, coupled_residual
+from verification.algorithm.arrival import NO_FORCE, arrived, coupled_residual
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, at_solution, forecast, linearise
+from verification.algorithm.loop import Ending, Outcome, follow
 from verification.algorithm.monolithic import SolveError
 from verification.algorithm.rates import ObservedRate, observed_rate
 from verification.algorithm.relaxation import Constant, Rule, rule_of
@@ -186,7 +187,7 @@ class Run(Document):
     @property
     def unfinished(self) -> str:
         """The words for the values at the end of a run that did not converge; empty where it did."""
-        return "" if self.converged else LAST_ITERATE
+        return self.outcome.unfinished
 
     @cached_property
     def remedy(self) -> Remedy | None:
@@ -212,7 +213,7 @@ class Run(Document):
         """Largest violation of a condition of contact by the joined state at the end, relative to its own traction g.
 
         Both displacements are joined, with g as the traction between the bodies; in the norm (5.21).  See
-        :func:`verification.algorithm.ending.coupled_residual`.
+        :func:`verification.algorithm.arrival.coupled_residual`.
         """
         return coupled_residual(self.pair, self.last)
 
@@ -431,7 +432,7 @@ def run(
 
     g are the forces that the bodies exchange, T g those after one step without relaxation. The run has converged
     where ``|||T g - g|||`` is at most the tolerance times the larger of ``|||g|||`` and ``|||T g|||``, and the
-    joined state satisfies the contact laws (:func:`verification.algorithm.ending.arrived`).
+    joined state satisfies the contact laws (:func:`verification.algorithm.arrival.arrived`).
 
     Parameters
     ----------
@@ -484,22 +485,19 @@ def run_from(
 ) -> Run:
     """Run T with a rule and a theta from a start to its outcome; parameters and errors as for :func:`run`."""
     pair, step = T.pair, rule.begin(T.pair, float(choice.theta), choice.rho)
+    ending = Ending(pair.settings.tolerance, pair.settings.max_iterations)
     seen: list[Iterate] = []
-    ending = Ending(pair.settings)
-    outcome: Outcome | None = None
-    joined = lambda: arrived(pair, seen[-1])
+
+    def ended(found: Iterate) -> Outcome | None:
+        watch(found)
+        return ending.at(found.residual, found.scale, lambda: arrived(pair, found))
+
     try:
-        for found in iterates(T, step, start.g, compared_with(pair, start)):
-            seen.append(found)
-            watch(found)
-            outcome = ending.at(found.iteration, found.residual, found.scale, joined)
-            if outcome is not None:
-                break
+        outcome = follow(iterates(T, step, start.g, compared_with(pair, start)), ended, seen)
     except KeyboardInterrupt:
         if not seen:
             raise
-        outcome = "interrupted"
-    assert outcome is not None  # the iterates do not end
+        outcome = Outcome.INTERRUPTED
     return Run(
         pair=pair,
         rule=rule,
@@ -507,5 +505,5 @@ def run_from(
         start=start,
         iterates=tuple(seen),
         outcome=outcome,
-        interrupted=outcome == "interrupted",
+        interrupted=outcome is Outcome.INTERRUPTED,
     )

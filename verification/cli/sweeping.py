@@ -101,7 +101,8 @@ def sweep(
     from verification.sweeps import sections as shown
     from verification.sweeps.grid import read_sweep
     from verification.sweeps.store import plan
-    from verification.sweeps.sweep import sweep_grid, work_of
+    from verification.sweeps.sweep import sweep_grid
+    from verification.sweeps.workers import work_of
 
     if dask is not None and jobs is not None:
         raise click.UsageError("needed either --jobs, for this machine, or --dask, for a cluster")

@@ -14,7 +14,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from ndtheory.constants import take
-from verification.algorithm.ending import RUNAWAY
+from verification.algorithm.loop import Ending, Evaluation, Outcome, evaluations, follow
 from verification.algorithm.relaxation import Rule, rule_of
 from verification.coupling.from_vectors import advice_of
 from verification.coupling.roles import Advice
@@ -180,10 +180,8 @@ class Coupled(Value):
 
     Attributes
     ----------
-    converged : bool
-        True if the last residual is below the tolerance.
-    diverged : bool
-        True if ``|Tg - g|`` ran away, or has grown in each of the last PACE steps.
+    outcome : Outcome
+        ``converged``; ``diverged`` if ``|Tg - g|`` ran away, or has grown in each of the last PACE steps; ``limit``.
     iterations : int
         Evaluations of T.
     force : array, shape (n,)
@@ -198,8 +196,7 @@ class Coupled(Value):
         For the next coupling of the same solvers; None where no two vectors differ.
     """
 
-    converged: bool
-    diverged: bool
+    outcome: Outcome
     iterations: int
     force: Floats
     displacement: Floats
@@ -208,10 +205,20 @@ class Coupled(Value):
     advice: Advice | None
 
     @property
+    def converged(self) -> bool:
+        """True if the last residual is within the tolerance."""
+        return self.outcome is Outcome.CONVERGED
+
+    @property
+    def diverged(self) -> bool:
+        """True if the residual ran away, or grew at the end."""
+        return self.outcome is Outcome.DIVERGED
+
+    @property
     def summary(self) -> str:
-        end = "converged" if self.converged else "diverged" if self.diverged else "not converged"
         why = "" if self.advice is None or self.advice.vectors is None else self.advice.vectors.negative
-        return f"{end}, {self.iterations} evaluations, residual {self.history[-1]:.1e}{f', but {why}' if why else ''}"
+        end = f"{self.outcome.words}, {self.iterations} evaluations, residual {self.history[-1]:.1e}"
+        return f"{end}, but {why}" if why else end
 
 
 def couple(
@@ -239,7 +246,7 @@ def couple(
     rule, theta
         As for :class:`Coupling`.
     tolerance : float
-        The coupling ends where ``|Tg - g| < tolerance |Tg|``, in the Euclidean norm.
+        The coupling ends where ``|Tg - g| <= tolerance |Tg|``, in the Euclidean norm.
     max_iterations : int
         The most evaluations of T; fewer where the residual runs away.
     listen : callable, optional
@@ -268,35 +275,29 @@ def couple(
     tolerance = float(take("tolerance", tolerance, "a number > 0", lambda value: value > 0))
     whole = lambda value: value >= 1 and value.denominator == 1
     max_iterations = int(take("max_iterations", max_iterations, "a whole number > 0", whole))
-    history, changes = list[float](), list[float]()
-    for iterations in range(1, max_iterations + 1):
-        displacement = _answer("neumann", neumann, g, iterations)
-        image = _answer("contact", contact, displacement, iterations)
-        size, change = float(np.linalg.norm(image)), float(np.linalg.norm(image - g))
-        history.append(change / size if size else math.inf if change else 0.0)
-        changes.append(change)
-        converged = change < tolerance * size or not change
-        away = change > RUNAWAY * changes[0]
-        last = converged or iterations == max_iterations or away
-        following = g
-        if last:
-            coupling.see(g, image)
-        else:
-            following = coupling.next(g, image)
+    ending, seen, displacement = Ending(tolerance, max_iterations - 1, patience=math.inf), list[Evaluation](), g
+
+    def T(g: Floats) -> Floats:
+        nonlocal displacement
+        displacement = _answer("neumann", neumann, g, len(seen) + 1)
+        return _answer("contact", contact, displacement, len(seen) + 1)
+
+    def ended(found: Evaluation) -> Outcome | None:
+        coupling.see(found.g, found.image)
+        outcome = ending.at(found.residual, found.scale)
         if listen is not None:
-            left = 0 if converged else _steps_left(history, tolerance)
-            state = CouplingState(iterations=iterations, residual=history[-1], steps_left=left, advice=coupling.advice)
-            listen(state)
-        if last:
-            break
-        g = following
+            left = 0 if outcome is Outcome.CONVERGED else _steps_left(seen, tolerance)
+            advice = coupling.advice
+            listen(CouplingState(iterations=len(seen), residual=found.relative, steps_left=left, advice=advice))
+        return Outcome.DIVERGED if outcome is Outcome.LIMIT and _grows(seen) else outcome
+
+    outcome = follow(evaluations(T, coupling._following, g), ended, seen)
     return Coupled(
-        converged=converged,
-        diverged=not converged and (away or _grows(changes)),
-        iterations=iterations,
-        force=g,
+        outcome=outcome,
+        iterations=len(seen),
+        force=seen[-1].g,
         displacement=displacement,
-        history=tuple(history),
+        history=tuple(each.relative for each in seen),
         spectrum=coupling.spectrum,
         advice=coupling.advice,
     )
@@ -317,16 +318,15 @@ def _answer(name: str, solver: Solver, given: Floats, iterations: int) -> Floats
         raise CouplingError(f"evaluation {iterations}: {error}") from None
 
 
-def _grows(changes: list[float]) -> bool:
-    """True if each of the last PACE steps has a larger change than the one before."""
-    some = changes[-1 - PACE :]
-    return len(some) > PACE and all(before < after for before, after in pairwise(some))
+def _grows(seen: list[Evaluation]) -> bool:
+    """True if each of the last PACE steps has a larger residual than the one before."""
+    some = seen[-1 - PACE :]
+    return len(some) > PACE and all(before.residual < after.residual for before, after in pairwise(some))
 
 
-def _steps_left(history: list[float], tolerance: float) -> int | None:
+def _steps_left(seen: list[Evaluation], tolerance: float) -> int | None:
     """Steps to the tolerance at the pace of the last ones."""
-    some = history[-1 - PACE :]
-    if len(some) < 2 or not 0 < some[-1] < some[0] < math.inf:
+    first, last, steps = seen[-1 - PACE :][0].relative, seen[-1].relative, min(len(seen) - 1, PACE)
+    if not 0 < last < first < math.inf:
         return None
-    pace = math.log(some[-1] / some[0]) / (len(some) - 1)
-    return max(math.ceil(math.log(tolerance / some[-1]) / pace), 1)
+    return max(math.ceil(math.log(tolerance / last) / (math.log(last / first) / steps)), 1)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from verification.algorithm.loop import Ending, Evaluation, Outcome, evaluations, follow
 from verification.coupling.kinds import METHODS, BodyNumber
 from verification.coupling.spectrum import Spectrum
 from verification.registry import RULES
@@ -20,6 +21,9 @@ TOLERANCE = 1e-6
 
 #: The most evaluations of T that are simulated, and those that a formula counts for a constant theta.
 MOST, COUNTED = 1000, 10**9
+
+#: A residual may grow by this factor before a method arrives.
+FAR = 1e60
 
 #: A constant theta is kept if it takes at most so many times the fewest steps; Aitken, whose steps are predicted less
 #: well, is preferred to IQN-ILS within the second number.
@@ -173,16 +177,10 @@ def _simulated(values: tuple[complex, ...], method: str, theta: float) -> int | 
         moved = lambdas * (error[:m] + 1j * error[m:])
         return np.asarray(solution - np.concatenate([moved.real, moved.imag]))
 
-    following, x = RULES[method].on_vectors(theta), np.zeros(len(solution))
-    for n in range(1, MOST + 1):
-        y = image(x)
-        size = float(np.linalg.norm(y - x))
-        if size < TOLERANCE * float(np.linalg.norm(y)):
-            return n
-        if not size < 1e60:
-            return None
-        x = following(x, y)
-    return None
+    ending, seen = Ending(TOLERANCE, MOST - 1, patience=math.inf, runaway=FAR), list[Evaluation]()
+    states = evaluations(image, RULES[method].on_vectors(theta), np.zeros(len(solution)))
+    arrives = follow(states, lambda found: ending.at(found.residual, found.scale), seen) is Outcome.CONVERGED
+    return len(seen) if arrives else None
 
 
 def advised(table: Sequence[MethodRow], *, tied: bool, exchanged: bool | None = None) -> Advised | None:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from verification.algorithm.loop import Outcome
 from verification.figures.style import OUTCOMES, THETA, ink, legend_beside, new_figure, plain, styled
 from verification.registry import BOUNDS
 from verification.registry import draw as main_figure
@@ -58,16 +59,15 @@ def _draw(ax: Axes, plane: Plane, left: float, bottom: float) -> None:
         fill = bound.fill or bound.colour
         look: dict[str, Any] = {"facecolor": fill, "edgecolor": ink(fill), "linewidth": 0, "hatch": bound.hatch}
         ax.fill_betweenx(k, np.maximum(low, left), high, label=f"{name}{unit}: k < {max(region.k):.2g}", **look)
-    for outcome, (colour, marker) in OUTCOMES.items():
+    for name, (colour, marker) in OUTCOMES.items():
+        outcome = Outcome(name)
         chosen = [point for point in plane.points if point.outcome == outcome]
         if chosen:
             x, y = [p.theta for p in chosen], [p.k for p in chosen]
             # a run that was still falling when it was stopped contradicts nothing: an empty marker
-            face, edge, words = colour, "white", outcome
-            if outcome == "limit":
-                face, edge, words = "white", colour, "still falling when stopped"
+            face, edge = ("white", colour) if outcome is Outcome.LIMIT else (colour, "white")
             look = {"markerfacecolor": face, "markeredgecolor": edge, "markeredgewidth": 0.7, "markersize": 5}
-            ax.plot(x, y, marker, **look, label=f"run {words}")
+            ax.plot(x, y, marker, **look, label=f"run {outcome.seen}")
 
 
 main_figure.register(Plane, draw_region)

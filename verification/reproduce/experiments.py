@@ -30,8 +30,8 @@ from verification.reproduce.claims import (
 from verification.reproduce.readings import READINGS, ModelReading
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import FAILED, Row
-from verification.sweeps.sweep import sweep_grid, work_of
-from verification.sweeps.workers import Placed, Work
+from verification.sweeps.sweep import sweep_grid
+from verification.sweeps.workers import Placed, Work, work_of
 
 FIGURES = tuple(CLAIMS)
 

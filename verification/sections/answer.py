@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from ndtheory import EnergyBounds
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
-from verification.sections.run import ended
 from verification.show.numbers import factor, figures, interval, near_one
 from verification.show.parts import Labelled, Section, section
 
@@ -37,7 +36,7 @@ def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
 def _seen(finished: Run) -> str:
     """How the run ended, and its rate."""
     count = f"{finished.iterations} step{'s' * (finished.iterations != 1)}"
-    steps = f"{ended(finished)} after {count}"
+    steps = f"{finished.outcome.words} after {count}"
     if finished.observed_growth is not None:
         return f"{steps}; each multiplies the error by {finished.observed_growth:.4g}"
     if finished.observed_rate is None and finished.converged:

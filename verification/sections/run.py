@@ -89,7 +89,7 @@ def happened(finished: Run, *, alone: bool) -> Section:
     if finished.observed_growth is not None:
         seen = Quantity(finished.observed_growth, f"grows by {finished.observed_growth:.4g}")
     if alone or not rows:
-        rows.insert(0, ("observed", seen, count(finished.iterations), ended(finished)))
+        rows.insert(0, ("observed", seen, count(finished.iterations), finished.outcome.words))
     parts: list[Shown | str] = [table(("", "rate", "steps", ""), rows)]
     if linear is not None and linear.predicted is not None:
         rate_of_it = f"this linearisation has the rate {near_one(linear.predicted)} along the run"
@@ -111,11 +111,6 @@ def happened(finished: Run, *, alone: bool) -> Section:
     parts += _contact(problem, finished.contact, f"; KKT residual of step II {finished.last.contact.kkt.residual:.1e}")
     parts.append(Note(_at_the_end(finished), only="report"))
     return section("run", "WHAT HAPPENED", *parts, caption=RATES, pictures=PICTURES)
-
-
-def ended(finished: Run) -> str:
-    """The outcome of a run in words."""
-    return "not converged" if finished.outcome == "limit" else finished.outcome
 
 
 def _at_the_end(finished: Run) -> str:

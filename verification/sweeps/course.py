@@ -11,20 +11,22 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import Any, Generic, TypeVar
+from functools import cached_property
+from itertools import count, groupby, repeat
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece, signs_of
-from verification.algorithm.ending import NO_FORCE, PATIENCE, RUNAWAY, Ending, Outcome, arrived, coupled_residual
+from verification.algorithm.arrival import NO_FORCE, arrived, coupled_residual
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, at_solution, linearised_rate
+from verification.algorithm.loop import Ending, Outcome, follow
 from verification.algorithm.monolithic import SolveError
-from verification.algorithm.rates import Noise, rate_of
+from verification.algorithm.rates import Noise, ObservedRate, rate_of
 from verification.algorithm.relaxation import Constant, Relaxation, Rule, Step
 from verification.algorithm.start import Start, begin_at, compared_with
 from verification.algorithm.theta import Choice
@@ -313,6 +315,36 @@ def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
     return (increment < PAPER) | (increment < PAPER * lengths(g))
 
 
+class State(NamedTuple):
+    """One evaluation of T in a sweep, of some steps their column ``i``; ``paper`` if the test of Section 6.3 is met."""
+
+    residual: float
+    scale: float
+    paper: bool
+    steps: Steps
+    i: int
+
+    def iterate(self, T: FixedPointMap, least: float) -> Iterate:
+        """Return all values of this evaluation."""
+        return self.steps.found or iterate_at(T, self.steps.g[:, self.i], least)
+
+
+def states(batches: Iterable[Steps], least: float) -> Iterator[State]:
+    """Yield the evaluations of a run one by one; ``least`` is a scale that none falls below."""
+    before: Floats | None = None
+    for steps in batches:
+        g = steps.g
+        before = np.full((len(g), 1), math.nan) if before is None else before
+        paper = meets_paper_test(g, before if g.shape[1] == 1 else np.column_stack([before, g[:, :-1]])).tolist()
+        scales = np.maximum(steps.scale, least).tolist()
+        yield from map(State, steps.residual.tolist(), scales, paper, repeat(steps), count())
+        before = g[:, -1:]
+
+
+class Undecided(Exception):
+    """Rounding decides when a run ends: its steps must be evaluated one by one."""
+
+
 def course(
     pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces
 ) -> tuple[dict[str, Any], dict[str, str]]:
@@ -332,29 +364,26 @@ def course(
     ContactError
         Step II did not reach its certificate before the run ended.
     """
-    T, went, least = pieces.map(), None, pieces.least
+    T = pieces.map()
+    went = None
     if isinstance(step, Relaxation) and not pair.held:
-        went = _follow(pieces, pieces.steps(T, step.theta), T, lean=True)
+        with suppress(Undecided):
+            went = _follow(pieces, pieces.steps(T, step.theta), T, lean=True)
     if went is None:  # any rule, and where rounding decides: a residual that wanders, or meets the tolerance exactly
         T.restart()
-        went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g, least)), T, lean=False)
-    assert went is not None  # only lean steps leave it to others
-    steps = len(went.residuals) - 1
-    reason = {
-        "limit": {"iterations": f"not converged in {steps} steps"},
-        "stalled": {"iterations": f"no new least residual over {PATIENCE} steps"},
-        "diverged": {"iterations": f"the residual grew by more than {RUNAWAY:g}"},
-    }.get(went.outcome, {})
+        went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g, pieces.least)), T, lean=False)
+    steps, outcome, why = len(went.seen) - 1, went.outcome, went.outcome.why
+    reason = {"iterations": why.format(steps=steps)} if why else {}
     if went.paper is None:
-        reason["iterations_paper"] = went.why or f"not met before the run ended: {went.outcome}"
-    observed = None if went.outcome == "diverged" else rate_of(went.residuals, went.floors, went.kinds)
+        reason["iterations_paper"] = went.why or f"not met before the run ended: {outcome}"
+    observed = None if outcome is Outcome.DIVERGED else went.rate(pieces.noise)
     if observed is None:
-        diverged = went.outcome == "diverged"
+        diverged = outcome is Outcome.DIVERGED
         reason["observed_rate"] = "the run diverged" if diverged else "too few steps stand clear of the rounding"
     end: Iterate | None = None
     coupled, linear = None, None
     try:
-        end = went.end()
+        end = went.seen[-1].iterate(T, pieces.least)
         coupled = coupled_residual(pair, end)
     except ContactError as error:
         reason["coupled_residual"] = str(error)
@@ -364,15 +393,15 @@ def course(
     try:
         if not isinstance(rule, Constant):
             raise NotLinear(f"the {rule.name} relaxation is no constant theta")
-        here, first = (end, went.entry) if end and went.outcome == "converged" else (pieces.solution(), None)
+        here, first = (end, went.entry) if end and outcome is Outcome.CONVERGED else (pieces.solution(), None)
         linear = linearised_rate(pieces.piece(here.g, here.contact.pattern), here, float(choice.theta), first)
     except (NotLinear, SolveError, ContactError) as error:
         reason["linearised_rate"] = str(error)
     columns = {
-        "iterations": steps if went.outcome == "converged" else None,
+        "iterations": steps if outcome is Outcome.CONVERGED else None,
         "iterations_paper": went.paper,
         "steps": steps,
-        "outcome": went.outcome,
+        "outcome": outcome.value,
         "observed_rate": None if observed is None else observed.value,
         "linearised_rate": linear,
         "coupled_residual": coupled,
@@ -382,105 +411,74 @@ def course(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Went:
-    """The steps of a run.
+    """A run to its end.
 
     Attributes
     ----------
-    outcome : {'converged', 'stalled', 'limit', 'diverged'}
-    residuals, floors : list of float
-        Of every evaluation until it ended, and the rounding of each.
-    kinds : list
-        The contact pattern of each, in a form that can be compared.
+    outcome : Outcome
+    seen : list of State
+        Every evaluation until it ended.
     paper : int or None
         n at which the test of Section 6.3 is met.
     why : str
         The error that ended it before that test was met.
-    end : callable
-        T at its last g.
-    entry : array
-        The g with which it came onto the piece of the last g for good.
     """
 
     outcome: Outcome
-    residuals: Sequence[float]
-    floors: Sequence[float]
-    kinds: Sequence[object]
+    seen: Sequence[State]
     paper: int | None
     why: str
-    end: Callable[[], Iterate]
-    entry: Floats
+
+    @property
+    def batches(self) -> list[Steps]:
+        """The steps that were taken together."""
+        return [steps for steps, _ in groupby(state.steps for state in self.seen)]
+
+    def rate(self, noise: Noise) -> ObservedRate | None:
+        """Return the rate at its end."""
+        g, u = (np.hstack([getattr(b, name) for b in self.batches])[:, : len(self.seen)] for name in "gu")
+        floors: list[float] = noise.of(g, u).tolist()
+        return rate_of([state.residual for state in self.seen], floors, [state.steps.pattern for state in self.seen])
+
+    @property
+    def entry(self) -> Floats:
+        """The g with which it came onto the piece of its last g for good."""
+        last = self.batches[-1]
+        for steps in reversed(self.batches):
+            if steps.piece != last.piece:
+                break
+            last = steps
+        return last.g[:, 0]
 
 
-def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, lean: bool) -> _Went | None:
-    """Follow a run, and go on until the test of Section 6.3 is met or the run is given up.
+def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, lean: bool) -> _Went:
+    """Follow a run to its end, and on until the test of Section 6.3 is met or the run is given up.
 
-    Lean steps, which are not evaluated one by one, give None where rounding decides when the run ends.
+    Raises
+    ------
+    Undecided
+        Of lean steps, which are not evaluated one by one.
     """
-    pair, bound, least = pieces.pair, pieces.pair.settings.tolerance, pieces.least
-    ending = Ending(pair.settings)
-    residuals: list[float] = []
-    walked: list[tuple[Floats, Floats]] = []
-    kinds: list[object] = []
-    outcome: Outcome | None = None
-    paper, why, n, lowest, since = None, "", -1, math.inf, 0
-    before = first = np.zeros(0)
-    piece: tuple[bytes, ...] = ()
-    evaluated: Callable[[], Iterate]
-    joined = lambda here: arrived(pair, here())
-    try:
-        for taken in batches:
-            if paper is None:
-                paper = _paper(taken.g, before, n)
-            if outcome is None:
-                walked.append((taken.g, taken.u))
-                if taken.piece != piece:
-                    piece, first = taken.piece, taken.g[:, 0]
-            scales = np.maximum(taken.scale, least).tolist()
-            for i, (residual, scale) in enumerate(zip(taken.residual.tolist(), scales, strict=True)):
-                n += 1
-                here = partial(_evaluated, T, taken, i, least)
-                ended = ending.at(n, residual, scale, partial(joined, here))
-                if outcome is None:
-                    residuals.append(residual)
-                    kinds.append(taken.pattern)
-                    outcome, evaluated = ended, here
-                    lowest, since = (residual, 0) if residual < lowest else (lowest, since + 1)
-                    if lean and (since > WANDERS or abs(residual - bound * scale) <= TIE * bound * scale):
-                        return None
-                if outcome and ((paper is not None and paper <= n) or ending.given_up(n, residual)):
-                    paper = None if paper is None or paper > n else paper
-                    break
-            else:
-                before = taken.g[:, -1]
-                continue
-            break
-    except ContactError as error:
-        if outcome is None:
-            raise
-        why = str(error)
-    assert outcome is not None  # the iterates do not end
-    gs, us = (np.hstack(parts)[:, : len(residuals)] for parts in zip(*walked, strict=True))
-    return _Went(
-        outcome=outcome,
-        residuals=residuals,
-        floors=pieces.noise.of(gs, us).tolist(),
-        kinds=kinds,
-        paper=paper,
-        why=why,
-        end=evaluated,
-        entry=first,
-    )
+    pair, least, tolerance = pieces.pair, pieces.least, pieces.pair.settings.tolerance
+    ending, walk, seen = Ending(tolerance, pair.settings.max_iterations), states(batches, least), list[State]()
 
+    def ended(state: State) -> Outcome | None:
+        outcome = ending.at(state.residual, state.scale, lambda: arrived(pair, state.iterate(T, least)))
+        bound = tolerance * state.scale
+        if lean and (ending.since > WANDERS or abs(state.residual - bound) <= TIE * bound):
+            raise Undecided
+        return outcome
 
-def _evaluated(T: FixedPointMap, taken: Steps, i: int, least: float) -> Iterate:
-    """Return T at one of some steps."""
-    return taken.found or iterate_at(T, taken.g[:, i], least)
+    def met(state: State) -> Outcome | None:
+        return Outcome.CONVERGED if state.paper else ending.at(state.residual, state.scale, lambda: False)
 
-
-def _paper(g: Floats, before: Floats, last: int) -> int | None:
-    """Return n of the first column of g at which :func:`meets_paper_test` is true; ``last`` is n of the one before."""
-    if len(before) and g.shape[1] == 1:
-        return last + 1 if meets_paper_test(g, before[:, None])[0] else None
-    columns = np.column_stack([before, g]) if len(before) else g
-    met = np.flatnonzero(meets_paper_test(columns[:, 1:], columns[:, :-1]))
-    return None if not len(met) else last + int(met[0]) + (1 if len(before) else 2)
+    outcome, why = follow(walk, ended, seen), ""
+    paper = next((n for n, state in enumerate(seen) if state.paper), None)
+    if paper is None and not ending.given_up(seen[-1].residual):
+        after = list[State]()
+        try:
+            if follow(walk, met, after) is Outcome.CONVERGED:
+                paper = len(seen) + len(after) - 1
+        except ContactError as error:
+            why = str(error)
+    return _Went(outcome=outcome, seen=seen, paper=paper, why=why)

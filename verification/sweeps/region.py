@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from ndtheory.keys import Part, key
-from verification.algorithm.ending import Outcome
+from verification.algorithm.loop import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
 from verification.constants import Measured, measure
 from verification.constants.measured import SLIDES
@@ -140,7 +140,7 @@ def _point(row: Row) -> Point:
     return Point(
         theta=row["theta"],
         k=row["friction"],
-        outcome=row["outcome"],
+        outcome=Outcome(row["outcome"]),
         iterations=row["steps"],
         coupled_residual=row["coupled_residual"],
     )

@@ -7,6 +7,7 @@ from shlex import quote
 from typing import Any
 
 from verification import registry
+from verification.algorithm.loop import Outcome
 from verification.problem.specification import Problem
 from verification.show.numbers import NONE, count, figures, near_one
 from verification.show.parts import Cell, Facts, Next, Quantity, Sections, closing, following, section, table
@@ -97,8 +98,8 @@ def plane(found: Plane, target: Path | None = None) -> Sections:
     notes += [f"{name}: {reason}" for name, reason in found.reason.items()]
     lines = table(("bound", "every small theta: k <", "some theta: k <", "theta at most"), rows)
     outcomes = [point.outcome for point in found.points]
-    words = {"limit": f"still falling when stopped after {MOST_STEPS} steps"}
-    runs = [", ".join(f"{outcomes.count(name)} {words.get(name, name)}" for name in dict.fromkeys(outcomes))]
+    after = {Outcome.LIMIT: f" after {MOST_STEPS} steps"}
+    runs = [", ".join(f"{outcomes.count(one)} {one.seen}{after.get(one, '')}" for one in dict.fromkeys(outcomes))]
     strongest = max((p.k for p in found.points if p.outcome == "converged"), default=None)
     if strongest is not None:
         runs.append(f"the largest friction with a run that converged: k = {strongest:g}")

@@ -21,7 +21,7 @@ from verification.spreadsheet import as_csv
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import COLUMNS, FAILED, Row, problem_of
 from verification.sweeps.store import Store
-from verification.sweeps.workers import Work, alone, together
+from verification.sweeps.workers import Work, work_of
 
 if TYPE_CHECKING:
     from verification.document import Figure
@@ -143,15 +143,6 @@ def duration(seconds: float) -> str:
     if seconds < 60:
         return f"about {seconds:.0f} s"
     return f"about {seconds / 60:.0f} min" if seconds < 3600 else f"about {seconds / 3600:.1f} h"
-
-
-def work_of(jobs: int, dask: str | None = None) -> Work:
-    """Choose who makes rows: the workers of a dask scheduler, this process for one job, else processes here."""
-    if dask is not None:
-        from verification.sweeps.cluster import on_cluster
-
-        return on_cluster(dask)
-    return alone if jobs == 1 else together(jobs)
 
 
 def sweep(

@@ -1,25 +1,28 @@
-"""Workers that make the rows of a sweep: this process, several on this machine, or the workers of a cluster."""
+"""Workers that make the rows of a sweep: this process, several on this machine, or those of a dask scheduler."""
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 import uuid
-from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import islice
 from multiprocessing import Pipe
-from typing import Any
+from typing import Any, NamedTuple
 
 from fem1d2d import mesh_files
 from ndtheory import __version__
+from verification.extras import require
 from verification.interface.pair import ContactPair
 from verification.machine.interrupts import CAN_WAIT, begin_child, undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.row import Row, SharedBodies, row
+from verification.sweeps.row import Row, SharedBodies, lost, row
 
 #: Rows by their places in the grid.
 Placed = list[tuple[int, Row]]
@@ -40,6 +43,9 @@ AHEAD = 2
 #: Seconds that the executor has to take the batches that it was given, before it is ended without that.
 LATEST = 1.0
 
+#: Seconds to wait for a scheduler.
+PATIENCE = 10
+
 #: The environment in which the libraries that multiply matrices use one thread in each process.
 ONE_THREAD = dict.fromkeys(mesh_files.ONE_THREAD, "1")
 
@@ -49,6 +55,11 @@ class NoWorkers(ProblemError):
 
     def __init__(self, where: str, why: str) -> None:
         super().__init__(where, "", None, f"{why}; with a store the same command goes on from the rows that were done")
+
+
+def work_of(jobs: int, dask: str | None = None) -> Work:
+    """Choose who makes rows: the workers of a dask scheduler, this process for one job, else processes here."""
+    return on_cluster(dask) if dask is not None else alone if jobs == 1 else together(jobs)
 
 
 def alone(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
@@ -62,35 +73,19 @@ def alone(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Ge
 
 @dataclass(frozen=True, kw_only=True)
 class Origin:
-    """The problem or pair of a sweep, under a name by which a worker recognises it."""
+    """The problem or pair of a sweep, under a name by which a worker recognises it, and the version of this library."""
 
-    name: str
-    start: Any = field(compare=False)
-
-    @classmethod
-    def of(cls, start: Problem | ContactPair) -> Origin:
-        """Return the origin of a new sweep."""
-        return cls(name=uuid.uuid4().hex, start=start)
+    start: Problem | ContactPair = field(compare=False)
+    name: str = field(default_factory=lambda: uuid.uuid4().hex)
+    version: str = __version__
 
 
-@dataclass(frozen=True, kw_only=True)
-class Handed:
-    """The rows that a worker hands over.
-
-    Attributes
-    ----------
-    seconds : float
-        Time to make them.
-    version : str
-        Of the library there.
-    unusable : str
-        Why the worker can make no row of this problem; empty where it can.
-    """
+class Handed(NamedTuple):
+    """The rows that a worker hands over, the seconds it took, and why it can make none of this problem."""
 
     rows: Placed
     seconds: float = 0.0
-    version: str = __version__
-    unusable: str = ""
+    why: str = ""
 
 
 #: Rows share condensed bodies and the setting of BLAS: a process makes one at a time, whatever threads it has.
@@ -98,9 +93,12 @@ _one_at_a_time = threading.Lock()
 
 
 @lru_cache(maxsize=1)
-def _bodies(origin: Origin) -> SharedBodies:
-    """Shared bodies of the rows of a worker."""
-    return SharedBodies(origin.start)
+def _begun(origin: Origin) -> SharedBodies | str:
+    """Return the shared bodies of the rows of a worker, or why it can make none."""
+    if origin.version != __version__:
+        return f"it has version {__version__} of ndtheory: needed {origin.version}, as here"
+    why = unusable(origin.start)
+    return f"it cannot read {why}" if why else SharedBodies(origin.start)
 
 
 def unusable(start: Problem | ContactPair) -> str:
@@ -109,20 +107,51 @@ def unusable(start: Problem | ContactPair) -> str:
     return "; ".join(f"{body.mesh.path}: {why}" for body in bodies if body.mesh and (why := body.mesh.unusable()))
 
 
-@lru_cache(maxsize=1)
-def _unusable(origin: Origin) -> str:
-    return unusable(origin.start)
-
-
 def some(origin: Origin, batch: Sequence[tuple[int, Row]]) -> Handed:
     """Make some rows in a worker."""
     with _one_at_a_time:
-        begun = time.monotonic()
-        if why := _unusable(origin):
-            return Handed(rows=[], unusable=why)
-        bodies = _bodies(origin)
+        begun, bodies = time.monotonic(), _begun(origin)
+        if isinstance(bodies, str):
+            return Handed([], why=bodies)
         rows = [(index, row(origin.start, values, bodies)) for index, values in batch]
-        return Handed(rows=rows, seconds=time.monotonic() - begun)
+        return Handed(rows, time.monotonic() - begun)
+
+
+class Batches:
+    """Neighbouring rows on one mesh, as many at once as take a moment for one of the workers."""
+
+    def __init__(self, wanted: Sequence[tuple[int, Row]], workers: int) -> None:
+        self._wanted = wanted
+        self._most = max(1, min(MOST_AT_ONCE, len(wanted) // (4 * workers)))
+        self._at_once = 1
+        self._rows, self._seconds = 0.0, 0.0
+
+    def __iter__(self) -> Iterator[Sequence[tuple[int, Row]]]:
+        first, wanted = 0, self._wanted
+        while first < len(wanted):
+            mesh, last = wanted[first][1].get("refine"), first + 1
+            while last < min(first + self._at_once, len(wanted)) and wanted[last][1].get("refine") == mesh:
+                last += 1
+            yield wanted[first:last]
+            first = last
+
+    def taken(self, handed: Handed) -> Placed:
+        """Return the rows that a worker hands over; their time decides the size of the next batches.
+
+        Raises
+        ------
+        NoWorkers
+            The worker has another version of this library, or cannot read a mesh file.
+        """
+        if handed.why:
+            raise NoWorkers("worker", handed.why)
+        # the last batches count most: another mesh takes another time
+        self._rows, self._seconds = self._rows / 2 + len(handed.rows), self._seconds / 2 + handed.seconds
+        self._at_once = max(1, min(self._most, int(SECONDS * self._rows / max(self._seconds, 1e-9))))
+        return handed.rows
+
+
+# --- processes of this machine ----------------------------------------------------------------------------------------
 
 
 @lru_cache(maxsize=1)
@@ -151,7 +180,7 @@ def together(jobs: int) -> Work:
         if not wanted:
             return
         count = processes(jobs, len(wanted))
-        origin, batches = Origin.of(start), Batches(wanted, count)
+        origin, batches = Origin(start=start), Batches(wanted, count)
         source, ahead = iter(batches), AHEAD * count
         executor = None
         waiting: set[Future[Handed]] = set()
@@ -189,7 +218,7 @@ def _start_trackers() -> None:
         tracker.ensure_running()
 
 
-def _stop(executor: Any, waiting: Collection[Future[Handed]]) -> None:
+def _stop(executor: Any, waiting: set[Future[Handed]]) -> None:
     """End the processes at once: their results are not wanted any more.
 
     The executor's thread looks up every batch that it was given, also one that it dropped when it had to end, and then
@@ -205,37 +234,111 @@ def _stop(executor: Any, waiting: Collection[Future[Handed]]) -> None:
         executor.terminate(kill_workers=True)
 
 
-class Batches:
-    """Neighbouring rows on one mesh, as many at once as take a moment for one of the workers."""
+# --- dask -------------------------------------------------------------------------------------------------------------
 
-    def __init__(self, wanted: Sequence[tuple[int, Row]], workers: int) -> None:
-        self._wanted = wanted
-        self._most = max(1, min(MOST_AT_ONCE, len(wanted) // (4 * workers)))
-        self._at_once = 1
-        self._rows, self._seconds = 0.0, 0.0
 
-    def __iter__(self) -> Iterator[Sequence[tuple[int, Row]]]:
-        first, wanted = 0, self._wanted
-        while first < len(wanted):
-            mesh, last = wanted[first][1].get("refine"), first + 1
-            while last < min(first + self._at_once, len(wanted)) and wanted[last][1].get("refine") == mesh:
-                last += 1
-            yield wanted[first:last]
-            first = last
+def on_cluster(address: str) -> Work:
+    """Return workers of the dask scheduler at an address.
 
-    def taken(self, handed: Handed) -> Placed:
-        """Return the rows that a worker hands over; their time decides the size of the next batches.
+    A worker condenses the bodies of a mesh once.  The batches of a worker that dies go to another one.  The scheduler
+    gives up a batch that was on four workers when they died, even if it only waited there behind another one.  The
+    rows of such batches are tried again one at a time, once nothing else runs; one that is given up then says so.
 
-        Raises
-        ------
-        NoWorkers
-            The worker has another version of this library, or cannot read a mesh file.
-        """
-        if handed.version != __version__:
-            raise NoWorkers("worker", f"it has version {handed.version} of ndtheory: needed {__version__}, as here")
-        if handed.unusable:
-            raise NoWorkers("worker", f"it cannot read {handed.unusable}")
-        # the last batches count most: another mesh takes another time
-        self._rows, self._seconds = self._rows / 2 + len(handed.rows), self._seconds / 2 + handed.seconds
-        self._at_once = max(1, min(self._most, int(SECONDS * self._rows / max(self._seconds, 1e-9))))
-        return handed.rows
+    Raises
+    ------
+    ProblemError
+        No dask here, or no scheduler there.
+    """
+    require("--dask")
+
+    def work(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
+        from distributed import Client
+
+        if not wanted:
+            return
+        _ask(address)
+        with undisturbed():
+            client = Client(address, timeout=PATIENCE, set_as_default=False)
+        try:
+            yield from _rows(client, start, wanted, address)
+        finally:
+            with undisturbed(), contextlib.suppress(Exception):  # the scheduler may have gone
+                client.close(timeout=2)
+
+    return work
+
+
+def _ask(address: str) -> None:
+    """Raise ProblemError if no scheduler answers: a client that finds none prints many lines."""
+    import asyncio
+
+    from distributed.comm.core import connect
+
+    async def knock() -> None:
+        comm = await connect(address, timeout=PATIENCE)
+        await comm.close()
+
+    def ask() -> None:
+        try:
+            asyncio.run(knock())
+        except Exception as error:  # of the address, of the network or of TLS: each has its own
+            wrong.append(error)
+
+    wrong: list[Exception] = []
+    asking = threading.Thread(target=ask, daemon=True)  # a notebook has a loop in its own thread already
+    asking.start()
+    asking.join()
+    if wrong:
+        needed = "needed the address of a dask scheduler that answers, as tcp://host:8786"
+        raise ProblemError("--dask", "address", address, f"{needed} ({wrong[0]})")
+
+
+def _rows(
+    client: Any, start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]], address: str
+) -> Generator[Placed, None, None]:
+    from distributed import KilledWorker, as_completed
+    from distributed.comm.core import CommClosedError
+
+    threads = max(1, sum(client.ncores().values()))
+    batches = Batches(wanted, threads)
+    source = iter(batches)
+    # a future, so that a pair of large matrices goes to each worker once, and is made again where a worker dies
+    origin = client.submit(_same, Origin(start=start), pure=False)
+    sent: dict[str, Sequence[tuple[int, Row]]] = {}
+    crowded: set[str] = set()  # of what is sent, all that was not alone all the time
+    suspects: deque[tuple[int, Row]] = deque()
+
+    def submit(batch: Sequence[tuple[int, Row]]) -> Any:
+        future = client.submit(some, origin, batch, pure=False)
+        if sent:
+            crowded.update((*sent, future.key))
+        sent[future.key] = batch
+        return future
+
+    try:
+        coming = as_completed((submit(batch) for batch in islice(source, AHEAD * threads)), loop=client.loop)
+        for future in coming:
+            batch, lone = sent.pop(future.key), future.key not in crowded
+            crowded.discard(future.key)
+            if future.status not in ("finished", "error"):
+                raise NoWorkers(address, "the scheduler has gone")
+            error = future.exception()
+            if isinstance(error, KilledWorker) and not (lone and len(batch) == 1):
+                suspects.extend(batch)
+            elif isinstance(error, KilledWorker):
+                index, values = batch[0]
+                yield [(index, lost(start, values, "the workers that ran it were killed, perhaps as memory ran out"))]
+            elif error is not None:
+                raise NoWorkers(address, f"a worker cannot make rows: {type(error).__name__}: {error}")
+            else:
+                yield batches.taken(future.result())
+            for batch in islice(source, 1):
+                coming.add(submit(batch))
+            if suspects and not sent:
+                coming.add(submit([suspects.popleft()]))
+    except (CommClosedError, TimeoutError) as error:
+        raise NoWorkers(address, f"the scheduler has gone ({error})") from None
+
+
+def _same(origin: Origin) -> Origin:
+    return origin

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import verification as vf
-from verification.algorithm.ending import MOST, TOLERANCES, Ending, arrived, coupled_residual
+from verification.algorithm.arrival import MOST, TOLERANCES, arrived, coupled_residual
+from verification.algorithm.loop import Ending
 from verification.algorithm.rates import noise
 from verification.algorithm.start import tied_force
 
@@ -151,13 +152,12 @@ def test_a_state_has_arrived_within_a_tenth_or_ten_times_the_tolerance_whichever
 
 
 def test_a_state_that_fails_does_not_end_a_run():
-    settings = replace(vf.build(vf.example("two-bars")).settings, tolerance=1e-2)
-    assert Ending(settings).at(0, 1e-3, 1.0, lambda: True) == "converged"
-    assert Ending(settings).at(0, 1e-3, 1.0, lambda: False) is None
-    ending = Ending(settings)
-    outcomes = [ending.at(n, 1e-3, 1.0, lambda: False) for n in range(60)]
+    assert Ending(1e-2, 500).at(1e-3, 1.0) == "converged"
+    assert Ending(1e-2, 500).at(1e-3, 1.0, lambda: False) is None
+    ending = Ending(1e-2, 500)
+    outcomes = [ending.at(1e-3, 1.0, lambda: False) for _ in range(60)]
     assert "stalled" in outcomes
-    assert Ending(settings).at(0, 1.0, np.inf, lambda: True) is None
+    assert Ending(1e-2, 500).at(1.0, np.inf) is None
 
 
 # --- starts -----------------------------------------------------------------------------------------------------------

@@ -18,8 +18,8 @@ from problem_list import PROBLEMS, SECTION_6, changed, loaded_bars
 from sample_runs import by_name, problem, relative
 
 import verification as vf
-from verification.algorithm.ending import PATIENCE, RUNAWAY
 from verification.algorithm.fixed_point import FixedPointMap, Iterate
+from verification.algorithm.loop import PATIENCE, RUNAWAY
 from verification.algorithm.runs import MOST_BYTES, Run
 from verification.contact import TOLERANCE, ContactError
 from verification.interface.pair import pair_from

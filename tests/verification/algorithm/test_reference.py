@@ -11,6 +11,7 @@ from problem_list import plates
 import verification as vf
 from verification.algorithm import reference
 from verification.algorithm.fixed_point import FixedPointMap
+from verification.algorithm.loop import Outcome
 from verification.algorithm.reference import by_cvxpy_alone
 from verification.contact import ContactError
 from verification.contact.active_set import ActiveSet
@@ -156,7 +157,7 @@ def test_where_the_active_set_does_not_close_auto_takes_the_program(run, monkeyp
 def test_the_document_tells_steps_rate_and_difference(run):
     document = vf.compare(run.pair).to_dict()["cvxpy"]
     assert set(document) == {"steps", "whole", "observed_rate", "largest_difference", "reason"}
-    short = replace(run, iterates=run.iterates[:2], outcome="limit")
+    short = replace(run, iterates=run.iterates[:2], outcome=Outcome.LIMIT)
     found = by_cvxpy_alone(short).to_dict()
     assert found["observed_rate"] is None
     assert "clear" in found["reason"]["observed_rate"]

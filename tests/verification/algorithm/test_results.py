@@ -12,6 +12,7 @@ from problem_list import plates
 
 import verification as vf
 from verification.algorithm.affine_piece import piece_of
+from verification.algorithm.loop import Outcome
 from verification.bounds.bound import Region
 from verification.document import Document
 from verification.registry import draw
@@ -29,7 +30,7 @@ def problem() -> vf.Problem:
 @pytest.fixture(scope="module")
 def results(problem) -> dict[str, Document]:
     region = Region(k=(0.1, 0.2), theta=((0.0, 0.5), (0.0, 0.4)), every=0.3, some=0.4)
-    point = Point(theta=0.4, k=0.1, outcome="converged", iterations=12, coupled_residual=1e-9)
+    point = Point(theta=0.4, k=0.1, outcome=Outcome.CONVERGED, iterations=12, coupled_residual=1e-9)
     return {
         "Measured": vf.measure(problem),
         "Run": vf.run(problem).linearise(),

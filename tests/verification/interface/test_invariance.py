@@ -16,6 +16,7 @@ from problem_list import PROBLEMS, SHEARED
 from sample_runs import converged
 
 import verification as vf
+from verification.algorithm.loop import Outcome
 from verification.algorithm.relaxation import Constant
 from verification.algorithm.runs import Run
 from verification.algorithm.start import Start
@@ -35,7 +36,7 @@ def few_steps(data: Mapping[str, Any], count: int = 4) -> list[Run]:
     given = Choice(theta=theta, source="given")
     start = Start(g=states[0].g)
     return [
-        Run(pair=pair, rule=Constant(), choice=given, start=start, iterates=(state,), outcome="limit")
+        Run(pair=pair, rule=Constant(), choice=given, start=start, iterates=(state,), outcome=Outcome.LIMIT)
         for state in states
     ]
 

@@ -12,6 +12,7 @@ from readable import contrast, grey
 from strategies import AT_NIGHT
 
 import verification as vf
+from verification.algorithm.loop import Outcome
 from verification.bounds.bound import Region
 from verification.cli.problems import examples
 from verification.figures import draw_bodies, draw_residuals, save
@@ -145,7 +146,7 @@ def test_bodies_pressed_together_are_drawn_touching(comparisons):
 )
 def test_a_run_cut_short_can_be_drawn(comparisons, tmp_path, name, history):
     comparison = comparisons[name]
-    short = replace(comparison.run, iterates=comparison.run.iterates[:history], outcome="interrupted")
+    short = replace(comparison.run, iterates=comparison.run.iterates[:history], outcome=Outcome.INTERRUPTED)
     save(draw_bodies(short), tmp_path / "bodies.svg")
     save(draw_residuals(short, comparison.computed), tmp_path / "residuals.svg")
     for figure in ("bodies", "residuals"):
@@ -170,7 +171,7 @@ def plane():
     """A plane with a region of every bound and a run of every outcome."""
     region = lambda k: Region(k=(k / 2, k), theta=((0.1, 0.9), (0.2, 0.8)), every=k, some=k)
     points = [
-        Point(theta=0.1 * i, k=0.1, outcome=outcome, iterations=9, coupled_residual=None)
+        Point(theta=0.1 * i, k=0.1, outcome=Outcome(outcome), iterations=9, coupled_residual=None)
         for i, outcome in enumerate(OUTCOMES, 1)
     ]
     regions = {name: region(10.0**-i) for i, name in enumerate(reversed(BOUNDS))}

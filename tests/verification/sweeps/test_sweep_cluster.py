@@ -161,7 +161,7 @@ def test_bodies_are_condensed_once_a_worker(cluster, tmp_path, monkeypatch):
 
 
 def test_no_scheduler_is_one_line(monkeypatch):
-    from verification.sweeps import cluster as module
+    from verification.sweeps import workers as module
 
     monkeypatch.setattr(module, "PATIENCE", 0.5)
     for address in ("tcp://127.0.0.1:9", "nonsense", "tls://127.0.0.1:9", "ftp://x:1"):

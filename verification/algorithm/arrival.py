@@ -1,4 +1,4 @@
-"""End of a run: its outcome, and the distance of its joined state from contact, measured in its own traction.
+"""Whether the state at the end of a run has arrived: its distance from contact, measured in its own traction.
 
 The joined state at g consists of both displacements, u2 from step I and u1 from step II, and of g itself as the
 traction between the bodies.  A residual ``|||T g - g|||`` that is small beside the first step does not bound it: with
@@ -9,25 +9,11 @@ node open.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Literal
 
 import numpy as np
 
 from verification.algorithm.iterate import Iterate
 from verification.interface.pair import ContactPair
-from verification.problem import Settings
-
-Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
-
-#: The words for the values at the end of a run that did not converge.
-LAST_ITERATE = "last iterate, not a solution"
-
-#: A run without a new least residual over so many steps has stalled.
-PATIENCE = 50
-
-#: A residual grown by this factor over the first one has diverged.
-RUNAWAY = 1e8
 
 #: A run has not arrived while its coupled residual is above both the first number and its tolerance times the second:
 #: a tenth of the traction is more than the step ratios of a converging run leave in any one condition.
@@ -86,31 +72,3 @@ def arrived(pair: ContactPair, iterate: Iterate) -> bool:
     tolerance = pair.settings.tolerance
     violation, size = _violation(pair, iterate)
     return min(violation, size) <= tolerance * iterate.scale or violation <= max(MOST, TOLERANCES * tolerance) * size
-
-
-class Ending:
-    """The rule that ends a run, from its residuals one by one."""
-
-    def __init__(self, settings: Settings) -> None:
-        self._tolerance, self._most = settings.tolerance, settings.max_iterations
-        self._least, self._since, self._first = math.inf, 0, math.inf
-
-    def at(self, iteration: int, residual: float, scale: float, joined: Callable[[], bool]) -> Outcome | None:
-        """Return the outcome if the run ends at this iterate, of these numbers, else None.
-
-        ``joined`` returns True if the iterate has :func:`arrived`; it is called where the residual meets the
-        tolerance.
-        """
-        self._first = residual if iteration == 0 else self._first
-        self._least, self._since = (residual, 0) if residual < self._least else (self._least, self._since + 1)
-        if residual <= self._tolerance * scale < math.inf and joined():
-            return "converged"
-        return self.given_up(iteration, residual)
-
-    def given_up(self, iteration: int, residual: float) -> Outcome | None:
-        """Return the outcome if the run ends here without convergence, else None."""
-        if not residual <= RUNAWAY * self._first:
-            return "diverged"
-        if self._since >= PATIENCE:
-            return "stalled"
-        return "limit" if iteration >= self._most else None
