@@ -18,16 +18,7 @@ from scipy.linalg import eigh
 
 from verification.ledger import inequalities
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import (
-    Difference,
-    Differences,
-    DrawnSetting,
-    along,
-    between,
-    directions,
-    pieces,
-    uniform_piece,
-)
+from verification.ledger.differences import Difference, DrawnSetting, along, between, directions, pieces, uniform_piece
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
 from verification.ledger.worst import Trial, WorstTally, discrete, draw_cases, pairs_of
@@ -390,9 +381,9 @@ def test_what_cannot_be_compared_is_not_called_true(id, side):
     piece = uniform_piece(case.pair, touching=True, sliding=0)
     pair = along(case.setting, piece, np.ones(case.pair.contact.grid.n * 2))
     tally = WorstTally(inequality=replace(entry, **{side: nan}))
-    tally.take(case, case if entry.about == "bodies" else Differences([pair]))
+    tally.take(case, case if entry.about == "bodies" else Difference.of([pair]))
     tally.inequality = entry  # what follows does not cover it up
-    tally.take(case, case if entry.about == "bodies" else Differences([pair]))
+    tally.take(case, case if entry.about == "bodies" else Difference.of([pair]))
     assert tally.evidence.holds is False
     assert tally.evidence.data["worst_ratio"] is None
 

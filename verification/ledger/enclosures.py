@@ -505,7 +505,7 @@ def both_sides(d: Any, r: Any, key: Key) -> Sides:
     return [(left.square(), right.square())] if id == "x-ratio" else [(left, right)]
 
 
-def decide(bodies: EnclosedBodies, id: str, of: Aspect) -> Evidence | None:
+def on_bodies(bodies: EnclosedBodies, id: str, of: Aspect) -> Evidence | None:
     """The evidence of an inequality on some bodies; None where the enclosures overlap."""
     key: Key = (id, of)
     unit = SMALL if key == ("5.30", "printed") else TINY if key in OF_MUCH else OWN
@@ -550,9 +550,9 @@ def decide(bodies: EnclosedBodies, id: str, of: Aspect) -> Evidence | None:
 
 def _decided(id: str, known: Callable[[str], EnclosedBodies]) -> list[Evidence]:
     """The evidence of all forms of a statement."""
-    found = [decide(known(place(key)), *key) for key in DECIDED if key[0] == id]
+    found = [on_bodies(known(place(key)), *key) for key in DECIDED if key[0] == id]
     return [evidence for evidence in found if evidence is not None]
 
 
 #: Inequalities on named bodies, decided by enclosures of both sides, the same at both levels.
-enclosed = source({id: partial(_decided, id) for id, _ in DECIDED}, lambda level: cache(EnclosedBodies))
+enclosed = source({id: partial(_decided, id) for id, _ in DECIDED}, lambda level, watch: cache(EnclosedBodies))

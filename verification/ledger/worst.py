@@ -17,7 +17,7 @@ from verification.constants import Measured, measure
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.cases import NAMED, problem
-from verification.ledger.differences import Differences, DrawnSetting, draw_pairs
+from verification.ledger.differences import Difference, DrawnSetting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
 from verification.ledger.inequalities import (
     ALLOWANCE,
@@ -150,7 +150,7 @@ class WorstTally:
     by_unit: dict[float, tuple[float, str, float | None, str]] = field(default_factory=dict)
     worst_apart: float = -math.inf
 
-    def take(self, case: Trial, subjects: Trial | Differences) -> None:
+    def take(self, case: Trial, subjects: Trial | Difference) -> None:
         """Compare both sides on the pairs of a problem, unless the inequality needs one grid and there are two."""
         inequality = self.inequality
         if inequality.one_grid and case.grids_differ:
@@ -278,7 +278,7 @@ def discrete(
     return result
 
 
-def pairs_of(case: Trial, random: np.random.Generator, *, starts: int, realised: int) -> Differences:
+def pairs_of(case: Trial, random: np.random.Generator, *, starts: int, realised: int) -> Difference:
     """The pairs of a problem; a named one has no loads worth trying."""
     realised = 0 if case.name in NAMED else realised
-    return Differences(list(draw_pairs(case.setting, random, starts=starts, realised=realised)))
+    return Difference.of(list(draw_pairs(case.setting, random, starts=starts, realised=realised)))
