@@ -199,7 +199,7 @@ def _number(product: Any) -> Fraction:
     return Fraction(product)
 
 
-#: Both sides of equalities between squares of norms, and between vectors; the other formulas are those of the search.
+#: Both sides of equalities between squares of norms, and between vectors; the search has the other formulas.
 OWN: Mapping[str, Callable[[RationalPair], tuple[Any, Any]]] = {
     "5.17": lambda d: (d.reaction, -d.one.energy @ d.d_1),
     "5.24": lambda d: (
