@@ -120,7 +120,7 @@ def says(says: str = "", **more: Any) -> Callable[[F], F]:
 
 
 class Part:
-    """A part of documents.  Its table is called ``part``; without one its keys are listed in the tables that have it."""
+    """A part of documents.  Its table is called ``part``; without one its keys are in the tables that have it."""
 
     part: ClassVar[str] = ""
 

@@ -51,9 +51,35 @@ class RightSides:
     m: Any
     M: Any
     C_R: Any
-    P: Any
-    D: Any
     Q: Any
+    energy: Any
+
+    def grows(self, formula: Callable[..., Any]) -> Any:
+        """A formula of C_K, m, M, C_R and u that falls with m and grows with the others (:mod:`ndtheory.bounds`)."""
+        raise NotImplementedError
+
+    def of_energy(self, formula: Callable[..., Any]) -> Any:
+        """A formula of rho, kappa_1 and kappa_2 that grows with each (:mod:`ndtheory.energy_norms`)."""
+        return float(formula(*self.energy))
+
+    @cached_property
+    def P(self) -> Any:
+        """The factor of (5.30)."""
+        return self.grows(formulas.P)
+
+    @cached_property
+    def D(self) -> Any:
+        """``C_T^2/C_R^2 - P``."""
+        return self.grows(formulas.D)
+
+    @property
+    def ratio(self) -> Any:
+        """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
+        return self.of_energy(energy_norms.largest_ratio)
+
+    def q_squared(self, theta: Any) -> Any:
+        """``q(theta)^2`` of the theorem in energy norms."""
+        return self.of_energy(lambda *constants: 1 - energy_norms.one_minus_square(theta, *constants))
 
     @property
     def A(self) -> Any:
@@ -153,20 +179,13 @@ class Reading(RightSides):
         """The factor of (5.11), by (5.16)."""
         return float(self.C_T * self.coercivity / self.A)
 
-    @cached_property
-    def P(self) -> float:
-        """The factor of (5.30)."""
-        return float(formulas.P(self.C_K, self.m, self.M, self.C_R, self.u))
+    def grows(self, formula: Callable[..., Any]) -> float:
+        return float(formula(self.C_K, self.m, self.M, self.C_R, self.u))
 
     @cached_property
     def Q(self) -> float:
         """The Lipschitz constant of T squared, as h_1 has it."""
         return float(formulas.Q(self.C_K, self.m, self.M, self.C_R))
-
-    @cached_property
-    def D(self) -> float:
-        """``C_T^2/C_R^2 - P``."""
-        return float(formulas.D(self.C_K, self.m, self.M, self.C_R, self.u))
 
     @cached_property
     def C_0(self) -> float:
@@ -193,17 +212,8 @@ class Reading(RightSides):
 
     def from_C0(self) -> tuple[float, ...]:
         """C_0 and the thetas above it inside the interval."""
-        C0, inside = float(formulas.C0(self.m, self.M, self.C_R)), self.contracting()
-        return (C0, *(theta for theta in inside if theta > C0)) if inside else ()
-
-    @property
-    def ratio(self) -> float:
-        """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
-        return float(energy_norms.largest_ratio(*self.energy))
-
-    def q_squared(self, theta: float) -> float:
-        """``q(theta)^2`` of the theorem in energy norms."""
-        return 1 - float(energy_norms.one_minus_square(theta, *self.energy))
+        inside = self.contracting()
+        return (self.C_0, *(theta for theta in inside if theta > self.C_0)) if inside else ()
 
 
 #: Numbers, or arrays of them.

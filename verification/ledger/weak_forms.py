@@ -29,8 +29,7 @@ from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
 from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair, pair_from
-from verification.ledger.cases import PROBLEMS, drawn
-from verification.ledger.curves import curved
+from verification.ledger.cases import PROBLEMS, curved, drawn
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.problem.specification import Problem
 
