@@ -310,7 +310,7 @@ MUTANTS: list[tuple[str, str, str, Callable[[Any, Reading, float], Any]]] = [
     ("prop-4.1.2", "printed", "no M/m", lambda b, r, t: b.across(b.E)),
     ("prop-4.1.2", "printed", "one trace norm", lambda b, r, t: b.contrast),
     ("x-continuity", "printed", "2 mu", lambda b, r, t: np.array([2 * body.material.lame_mu for body in b.bodies])),
-    ("x-lift-bound", "printed", "its root", lambda b, r, t: np.sqrt(np.array(b.M) / np.array(b.m)) / 2),
+    ("x-lift-bound", "printed", "its root", lambda b, r, t: np.sqrt(b.contrast) / 2),
     ("5.11", "printed", "no C_K", lambda d, r, t: r.A / r.m * d.size_2),
     ("5.12", "printed", "no friction term", lambda d, r, t: d.mixed_1),
     ("5.12", "printed", "friction with its sign flipped", lambda d, r, t: (d.mixed_1, -d.friction)),

@@ -73,31 +73,15 @@ class Trial:
         """The norms squared of H^1/2(Gamma_c)."""
         return self.setting.forms.E_1, self.setting.forms.E_2
 
-    @cached_property
-    def spectra(self) -> list[tuple[float, float]]:
-        """Extremal eigenvalues of (A_a, H_a) from the whole spectrum of a dense pencil."""
-        spectra = [eigvalsh(body.stiffness.toarray(), body.gram_matrix.toarray()) for body in self.bodies]
-        return [(float(values[0]), float(values[-1])) for values in spectra]
-
-    @property
-    def m(self) -> list[float]:
-        """m^a."""
-        return [getattr(self.measured, body.name).m.value for body in self.bodies]
-
-    @property
-    def M(self) -> list[float]:
-        """M^a."""
-        return [getattr(self.measured, body.name).M.value for body in self.bodies]
-
     @property
     def contrast(self) -> list[float]:
         """``M^a/m^a``."""
-        return [M / m for M, m in zip(self.M, self.m, strict=True)]
+        return [one.M.value / one.m.value for one in (getattr(self.measured, body.name) for body in self.bodies)]
 
-    @property
+    @cached_property
     def largest(self) -> list[float]:
-        """M^a from the whole spectrum."""
-        return [largest for _, largest in self.spectra]
+        """M^a from the whole spectrum of a dense pencil."""
+        return [float(eigvalsh(each.stiffness.toarray(), each.gram_matrix.toarray())[-1]) for each in self.bodies]
 
     @property
     def continuity(self) -> list[float]:
