@@ -78,14 +78,14 @@ FLOORS: dict[str, dict[str, str]] = {
     "the paper": {
         "verification.reproduce": "__init__ claims experiments readings refutation sections",
         "verification.ledger": (
-            "__init__ cases convergence curves differences enclosures evidence experiments inequalities large_friction "
+            "__init__ cases convergence differences enclosures evidence experiments inequalities large_friction "
             "rational_pairs rows sections sheets solutions sources weak_forms worst"
         ),
     },
     "pages that move": {"verification.exploration": "__init__ film javascript page sections"},
     "figures": {
         "verification.figures": (
-            "__init__ best_theta bodies factor history layers proof_map region reproduction residuals roles squares "
+            "__init__ best_theta bodies factor history layers proof_map region reproduction residuals squares "
             "style sweep waterfall"
         )
     },

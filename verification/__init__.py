@@ -178,7 +178,7 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
         "bounds.table": ("figures.squares",),
         "comparison": ("figures.residuals",),
         "constants.measured": ("figures.factor",),
-        "coupling.roles": ("figures.roles",),
+        "coupling.roles": ("figures.factor",),
         "reproduce.experiments": ("figures.reproduction",),
         "sweeps.region": ("figures.region",),
         "sweeps.sweep": ("figures.sweep",),

@@ -141,7 +141,7 @@ def _root(square: Fraction) -> Number:
     return upper(Fraction(Interval.of(square).sqrt().hi))
 
 
-#: What keys of upper bounds share; their reasons stand beside those of the document.
+#: Arguments of the keys of upper bounds; the certificate gives their reasons.
 AT_MOST: dict[str, Any] = {"of": upper, "unit": "1", "type": "Number", "why": None}
 
 

@@ -84,8 +84,8 @@ class FilmedRun(Part):
 class Film(Part):
     """Runs of one pair on a grid.
 
-    ``pair`` has these roles and the problem's friction; ``lines`` are runs by friction, then theta; ``regions`` are
-    those of the bounds that follow from the constants.
+    ``pair`` has these roles and the problem's friction; ``lines`` are runs by friction, then theta; ``regions``
+    belong to the bounds that follow from the constants.
     """
 
     pair: ContactPair

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigvalsh
 
-from fem1d2d import mortar, solver
+from fem1d2d import mortar
 from fem1d2d.mesh import Floats
 from ndtheory import EDITIONS, evaluate, evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap
@@ -90,45 +90,30 @@ def strong_form(setting: RunsOfLevel) -> list[Evidence]:
     ]
 
 
-class Norms:
-    """The norms of V and of the dual of V^2, from the whole Gram matrices."""
-
-    def __init__(self, weak: Weak) -> None:
-        self.weak, self._solve = weak, solver(weak.two.gram_matrix)
-
-    def of(self, body: Body, field: Floats) -> float:
-        """The H1 norm."""
-        return float(np.sqrt(field @ (body.gram_matrix @ field)))
-
-    def dual(self, force: Floats) -> float:
-        """The norm of V^2' of nodal forces on Gamma_c."""
-        load = np.zeros(len(self.weak.two.positions))
-        load[self.weak.two.interface] = self.weak.pair.neumann.orient(force)
-        return float(np.sqrt(max(float(load @ self._solve(load)), 0.0)))
+def size(body: Body, field: Floats) -> float:
+    """The H1 norm."""
+    return float(np.sqrt(field @ (body.gram_matrix @ field)))
 
 
 def strong_convergence(weak: Weak, states: Sequence[Iterate], theta: float, m: float) -> Floats:
     """Proposition 5.1: left side of its estimate over the right side, for pairs of steps of a run."""
-    norms = Norms(weak)
     fields = [weak.at(state) for state in states[:-1]]
-    dual = lambda i, j: norms.dual(states[i].g - states[j].g)
+    dual = lambda i, j: weak.dual(states[i].g - states[j].g)
     result = []
     for i in range(len(fields)):
         for j in range(i):
             difference = fields[i].one - fields[j].one
-            size = norms.of(weak.one, difference)
-            lifted = norms.of(weak.two, weak.lift(weak.two, weak.trace(weak.one, difference)))
+            lifted = size(weak.two, weak.lift(weak.two, weak.trace(weak.one, difference)))
             right = (dual(i, j) + dual(i + 1, i) + dual(j + 1, j)) * lifted / (theta * m)
-            result.append(size**2 / right if right > 0 else 0.0)
+            result.append(size(weak.one, difference) ** 2 / right if right > 0 else 0.0)
     return np.array(result)
 
 
 def by_lemma_5_3(weak: Weak, states: Sequence[Iterate], factor: float) -> Floats:
     """``|u_i^1 - u_j^1|_1`` over ``factor |g_{i-1} - g_{j-1}|`` in the dual of V^2, for pairs of steps of a run."""
-    norms = Norms(weak)
     fields = [weak.at(state) for state in states]
     pairs = combinations(zip(states, fields, strict=True), 2)
-    ratios = [norms.of(weak.one, u.one - v.one) / (factor * norms.dual(a.g - b.g)) for (a, u), (b, v) in pairs]
+    ratios = [size(weak.one, u.one - v.one) / (factor * weak.dual(a.g - b.g)) for (a, u), (b, v) in pairs]
     return np.array(ratios)
 
 
@@ -179,12 +164,9 @@ def _estimate(of: Any, ratios: Mapping[str, float], found: Sequence[Case], text:
 
 def apart(case: Case) -> float:
     """The distance in V of the end of the run to the global solution, relative to the latter."""
-    norms, weak = Norms(case.weak), case.weak
-    parts = [
-        (norms.of(body, a - b), norms.of(body, b))
-        for body, a, b in ((weak.one, case.limit.one, case.solution.one), (weak.two, case.limit.two, case.solution.two))
-    ]
-    return math.hypot(*(p[0] for p in parts)) / math.hypot(*(p[1] for p in parts))
+    weak, end, u = case.weak, case.limit, case.solution
+    away = size(weak.one, end.one - u.one), size(weak.two, end.two - u.two)
+    return math.hypot(*away) / math.hypot(size(weak.one, u.one), size(weak.two, u.two))
 
 
 # Theorem 5.9.
@@ -243,7 +225,7 @@ class RunsOfLevel:
                 k = Fraction(min(c.value for c in thresholds if c is not None) / 2).limit_denominator(10**9)
                 steps = 300 if self.level == "quick" else 20_000
                 iteration = replace(problem.iteration, max_iterations=steps)
-                problem = replace(problem, contact=replace(problem.contact, friction=k), iteration=iteration)
+                problem = replace(problem.changed(friction=k), iteration=iteration)
                 measured = measured.with_friction(float(k))
             constants = measured.constants()
             assert constants is not None
@@ -262,7 +244,7 @@ class RunsOfLevel:
             threshold = measured.friction_threshold
             if threshold is not None and float(problem.contact.friction) > threshold.value / 2:
                 k = Fraction(threshold.value / 2).limit_denominator(10**6)
-                problem = replace(problem, contact=replace(problem.contact, friction=k))
+                problem = problem.changed(friction=k)
                 measured = measured.with_friction(float(k))
             constants = measured.energy_constants()
             assert constants is not None

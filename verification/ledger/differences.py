@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,7 @@ class DrawnSetting:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Difference:
-    """The difference of two solutions of steps I and II.
+    """The difference of two solutions of steps I and II, or several of one problem, one row of each array for each.
 
     Where the grids differ, only P leads from the Neumann body to the contact grid: step II stays below ``P w^2_N``,
     with ``P w^2_T`` in the jump, and (5.4) lifts ``P v``.  (5.12) takes ``w~^1 + R_D^1 P (w^2 - w~^2)``.
@@ -105,115 +106,105 @@ class Difference:
     reaction: Floats
     d_1: Floats
     d_2: Floats
-    friction: float
-    size: float
+    friction: Any
+    size: Any
+
+    @classmethod
+    def of(cls, each: Sequence[Difference]) -> Difference:
+        """Differences of one problem together."""
+        arrays = {name: np.array([getattr(one, name) for one in each]) for name in ARRAYS}
+        return cls(setting=each[0].setting, **arrays)
+
+    def __len__(self) -> int:
+        return len(self.force)
+
+    def __iter__(self) -> Iterator[Difference]:
+        return (replace(self, **{name: getattr(self, name)[i] for name in ARRAYS}) for i in range(len(self)))
 
     @cached_property
-    def size_1(self) -> float:
+    def size_1(self) -> Any:
         """``|w^1 - w~^1|_1`` in H1."""
         return _norm(self.d_1, self.setting.forms.N_1)
 
     @cached_property
-    def size_2(self) -> float:
+    def size_2(self) -> Any:
         """``|w^2 - w~^2|_2`` in H1."""
         return _norm(self.d_2, self.setting.forms.N_2)
 
     @cached_property
-    def norm(self) -> float:
+    def norm(self) -> Any:
         """``|||psi - psi~|||`` (5.21)."""
         return _norm(self.force, self.setting.forms.inverse)
 
     @cached_property
-    def dual(self) -> float:
+    def dual(self) -> Any:
         """The norm of psi - psi~ in the dual of V^2."""
         return _norm(self.force, self.setting.forms.dual)
 
     @cached_property
-    def norm_T(self) -> float:
+    def norm_T(self) -> Any:
         """``|||T psi - T psi~|||`` (5.21)."""
         return _norm(self.reaction, self.setting.forms.inverse)
 
     @cached_property
-    def dual_T(self) -> float:
+    def dual_T(self) -> Any:
         """The norm of T psi - T psi~ in the dual of V^2."""
         return _norm(self.reaction, self.setting.forms.dual)
 
     @cached_property
-    def energy_1(self) -> float:
+    def energy_1(self) -> Any:
         """``a^1(w^1 - w~^1, w^1 - w~^1)``."""
-        return float(self.d_1 @ self.setting.bilinear_1 @ self.d_1)
+        return _product(self.d_1 @ self.setting.bilinear_1, self.d_1)
 
     @cached_property
-    def mixed_1(self) -> float:
+    def mixed_1(self) -> Any:
         """``a^1(w^1 - w~^1, R_D^1 (w^2 - w~^2))``."""
-        return float(self.d_2 @ self.setting.felt_1 @ self.d_1)
+        return _product(self.d_2 @ self.setting.felt_1, self.d_1)
 
     @cached_property
     def lift_T(self) -> Floats:
         """The trace of ``R^2 (T psi - T psi~)`` (5.20)."""
-        return self.setting.pair.neumann.flexibility(self.reaction)
+        return self.setting.pair.neumann.flexibility(self.reaction.T).T
 
     @cached_property
-    def inner(self) -> float:
+    def inner(self) -> Any:
         """``a^2(R^2 (T psi - T psi~), R^2 (psi - psi~))``."""
-        return float(self.lift_T @ self.setting.bilinear_2 @ self.setting.pair.neumann.flexibility(self.force))
+        lift = self.setting.pair.neumann.flexibility(self.force.T).T
+        return _product(self.lift_T @ self.setting.bilinear_2, lift)
 
     @cached_property
-    def mixed_2(self) -> float:
+    def mixed_2(self) -> Any:
         """``a^2(R^2 (T psi - T psi~), w^2 - w~^2)``."""
-        return float(self.lift_T @ self.setting.bilinear_2 @ self.d_2)
+        return _product(self.lift_T @ self.setting.bilinear_2, self.d_2)
 
     @cached_property
-    def work(self) -> float:
+    def work(self) -> Any:
         """``<T psi - T psi~, w^2 - w~^2>``."""
-        return float(self.reaction @ self.d_2)
+        return _product(self.reaction, self.d_2)
 
     @cached_property
-    def step(self) -> float:
+    def step(self) -> Any:
         """``|||psi - T psi - (psi~ - T psi~)|||``: the difference of the unrelaxed steps."""
         return _norm(self.force - self.reaction, self.setting.forms.inverse)
 
     @cached_property
-    def relaxed(self) -> Callable[[float], float]:
+    def relaxed(self) -> Callable[[float], Any]:
         """theta -> ``|||T_theta psi - T_theta psi~|||`` (5.7), which many inequalities ask for."""
         inverse = self.setting.forms.inverse
         return cache(lambda theta: _norm(theta * self.reaction + (1 - theta) * self.force, inverse))
 
 
-class Differences:
-    """One or more differences of one problem: each attribute of :class:`Difference` is an array of all of them."""
-
-    def __init__(self, each: Sequence[Difference]) -> None:
-        self.each, self.setting = each, each[0].setting
-
-    def __len__(self) -> int:
-        return len(self.each)
-
-    def __iter__(self) -> Iterator[Difference]:
-        return iter(self.each)
-
-    def __getattr__(self, name: str) -> Floats:
-        if name == "each" or name.startswith("_"):  # a copy asks before it has anything
-            raise AttributeError(name)
-        values = np.array([getattr(difference, name) for difference in self.each])
-        setattr(self, name, values)
-        return values
-
-    @cached_property
-    def relaxed(self) -> Callable[[float], Floats]:
-        """theta -> the same of each."""
-        inverse = self.setting.forms.inverse
-
-        @cache
-        def of_each(theta: float) -> Floats:
-            steps = theta * self.reaction + (1 - theta) * self.force
-            return np.asarray(np.sqrt(np.maximum(((steps @ inverse) * steps).sum(axis=1), 0.0)))
-
-        return of_each
+#: What several differences have one row each of.
+ARRAYS = ("force", "reaction", "d_1", "d_2", "friction", "size")
 
 
-def _norm(v: Floats, gram: Floats) -> float:
-    return math.sqrt(max(float(v @ gram @ v), 0.0))
+def _product(v: Floats, w: Floats) -> Any:
+    """The inner product of two vectors, or of each row of two matrices."""
+    return (v * w).sum(axis=-1)
+
+
+def _norm(v: Floats, gram: Floats) -> Any:
+    return np.sqrt(np.maximum(_product(v @ gram, v), 0.0))
 
 
 # --- two forces pushed through steps I and II

@@ -27,7 +27,7 @@ from scipy.linalg import eigh
 from fem1d2d.mesh import Floats
 from fem1d2d.proofs.enclosed import Enclosed, upwards
 from fem1d2d.proofs.proved import Ends
-from ndtheory import Number, energy_norms
+from ndtheory import Number
 from ndtheory import bounds as formulas
 from ndtheory.continuum.intervals import Interval
 from ndtheory.number import SLACK, decimal, directed, working_precision
@@ -355,7 +355,6 @@ class EnclosedConstants(RightSides):
         return (self.A + self.C_K + (self.C_K * self.m).sqrt()) / self.m
 
     def grows(self, formula: Callable[..., Any]) -> Interval:
-        """A formula of C_K, m, M, C_R and u that falls with m and grows with the others (:mod:`ndtheory.bounds`)."""
         x, m, M, C_R = self.C_K, self.m, self.M, self.C_R
         edition = formulas.PRINTED if self.printed else formulas.REPAIRED
         with working_precision():
@@ -364,19 +363,9 @@ class EnclosedConstants(RightSides):
         return Interval.between(low, high)
 
     @property
-    def P(self) -> Interval:
-        """The factor of (5.30)."""
-        return self.grows(formulas.P)
-
-    @property
     def C_T(self) -> Interval:
         """(5.16)."""
         return self.grows(lambda x, m, M, C_R, u: formulas.lipschitz(m, M, C_R, x))
-
-    @property
-    def D(self) -> Interval:
-        """``C_T^2/C_R^2 - P``."""
-        return self.grows(formulas.D)
 
     @property
     def Q(self) -> Interval:
@@ -420,20 +409,14 @@ class EnclosedConstants(RightSides):
         h_1, h_2 = formulas.one_minus_h1(theta, self.D, self.Q), formulas.one_minus_h2(theta, self.P)
         return Interval(min(h_1.lo, h_2.lo), min(h_1.hi, h_2.hi))
 
-    def _energy(self, formula: Callable[..., Any]) -> Interval:
-        """A formula of rho, kappa_1 and kappa_2 that grows with each (:mod:`ndtheory.energy_norms`)."""
+    def of_energy(self, formula: Callable[..., Any]) -> Interval:
         with working_precision():
             low, high = formula(*(c.lo for c in self.energy)), formula(*(c.hi for c in self.energy))
             return Interval.between(low * (1 - SLACK), high * (1 + SLACK))
 
-    @property
-    def ratio(self) -> Interval:
-        """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
-        return self._energy(energy_norms.largest_ratio)
-
     def q_squared(self, theta: Fraction) -> Interval:
-        """``q(theta)^2`` of the theorem in energy norms."""
-        return self._energy(lambda *constants: 1 - energy_norms.one_minus_square(decimal(theta), *constants))
+        found: Interval = super().q_squared(decimal(theta))
+        return found
 
 
 #: The statements that are decided only of the bodies.
@@ -505,7 +488,7 @@ def both_sides(d: Any, r: Any, key: Key) -> Sides:
     return [(left.square(), right.square())] if id == "x-ratio" else [(left, right)]
 
 
-def decide(bodies: EnclosedBodies, id: str, of: Aspect) -> Evidence | None:
+def on_bodies(bodies: EnclosedBodies, id: str, of: Aspect) -> Evidence | None:
     """The evidence of an inequality on some bodies; None where the enclosures overlap."""
     key: Key = (id, of)
     unit = SMALL if key == ("5.30", "printed") else TINY if key in OF_MUCH else OWN
@@ -550,9 +533,9 @@ def decide(bodies: EnclosedBodies, id: str, of: Aspect) -> Evidence | None:
 
 def _decided(id: str, known: Callable[[str], EnclosedBodies]) -> list[Evidence]:
     """The evidence of all forms of a statement."""
-    found = [decide(known(place(key)), *key) for key in DECIDED if key[0] == id]
+    found = [on_bodies(known(place(key)), *key) for key in DECIDED if key[0] == id]
     return [evidence for evidence in found if evidence is not None]
 
 
 #: Inequalities on named bodies, decided by enclosures of both sides, the same at both levels.
-enclosed = source({id: partial(_decided, id) for id, _ in DECIDED}, lambda level: cache(EnclosedBodies))
+enclosed = source({id: partial(_decided, id) for id, _ in DECIDED}, lambda level, watch: cache(EnclosedBodies))

@@ -43,6 +43,10 @@ class Evidence(Part):
     )
 
 
+#: The callable that is told the share that is done.
+Watch = Callable[[float], None]
+
+
 class Source(Protocol):
     """A function that gathers evidence, by statement: each module that gathers has one.
 
@@ -50,9 +54,7 @@ class Source(Protocol):
     how many problems are taken, where that matters.  ``watch`` is called with the share that is done.
     """
 
-    def __call__(
-        self, ids: Collection[str], level: Level, watch: Callable[[float], None], /
-    ) -> Mapping[str, Sequence[Evidence]]: ...
+    def __call__(self, ids: Collection[str], level: Level, watch: Watch, /) -> Mapping[str, Sequence[Evidence]]: ...
 
 
 def figure(value: float, digits: int = 6) -> float:
@@ -60,16 +62,16 @@ def figure(value: float, digits: int = 6) -> float:
     return float(f"{value:.{digits - 1}e}")
 
 
-def source(checks: Mapping[str, Callable[[Any], list[Evidence]]], shared: Callable[[Level], Any]) -> Source:
+def source(checks: Mapping[str, Callable[[Any], list[Evidence]]], shared: Callable[[Level, Watch], Any]) -> Source:
     """A source with one check for each statement; the checks share an object, made for the level if any is wanted."""
 
     def gather(
-        ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
+        ids: Collection[str] | None = None, level: Level = "quick", watch: Watch = lambda done: None
     ) -> dict[str, list[Evidence]]:
         chosen = [id for id in checks if ids is None or id in ids]
         found = {}
         with one_thread():
-            given = shared(level) if chosen else None
+            given = shared(level, watch) if chosen else None
             for done, id in enumerate(chosen):
                 watch(done / len(chosen))
                 if entries := checks[id](given):

@@ -24,7 +24,7 @@ from verification.ledger.evidence import Evidence, Level, figure, source
 from verification.reproduce import READINGS, ModelReading, reproduce
 from verification.reproduce.claims import CLAIMS, HARD, OPTIMUM, SERVES, SOFT, Claim, Curve, zones
 from verification.reproduce.experiments import Outcome, Result, curve_of
-from verification.reproduce.refutation import COMMON, LISTED, PRINTED, Runs, decide
+from verification.reproduce.refutation import COMMON, LISTED, PRINTED, Runs, judged
 from verification.sweeps.course import PAPER, meets_paper_test
 from verification.sweeps.row import FAILED, Row
 
@@ -69,11 +69,11 @@ class Section6:
         for reading in [reading for reading, seen in outcomes.items() if seen.holds is None and not seen.refused]:
             if any(seen.holds for seen in outcomes.values()):
                 break
-            outcomes[reading] = decide(claim, self.runs(reading))
+            outcomes[reading] = judged(claim, self.runs(reading))
         return Result(figure=claim.name, outcomes=tuple(outcomes.values()))
 
     def _steps(self, claim: Claim, reading: ModelReading) -> Outcome:
-        return decide(claim, self.runs(reading), self._meshes)
+        return judged(claim, self.runs(reading), self._meshes)
 
     @property
     def compared(self) -> list[ModelReading]:
@@ -328,4 +328,4 @@ CHECKS: dict[str, Callable[[Section6], list[Evidence]]] = {
 }
 
 #: Evidence for the numerical results of Section 6.  Quick takes the mesh of 190 nodes, full all four.
-experiments = source(CHECKS, Section6)
+experiments = source(CHECKS, lambda level, watch: Section6(level))

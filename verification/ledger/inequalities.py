@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal
@@ -51,9 +51,35 @@ class RightSides:
     m: Any
     M: Any
     C_R: Any
-    P: Any
-    D: Any
     Q: Any
+    energy: Any
+
+    def grows(self, formula: Callable[..., Any]) -> Any:
+        """A formula of C_K, m, M, C_R and u that falls with m and grows with the others (:mod:`ndtheory.bounds`)."""
+        raise NotImplementedError
+
+    def of_energy(self, formula: Callable[..., Any]) -> Any:
+        """A formula of rho, kappa_1 and kappa_2 that grows with each (:mod:`ndtheory.energy_norms`)."""
+        return float(formula(*self.energy))
+
+    @cached_property
+    def P(self) -> Any:
+        """The factor of (5.30)."""
+        return self.grows(formulas.P)
+
+    @cached_property
+    def D(self) -> Any:
+        """``C_T^2/C_R^2 - P``."""
+        return self.grows(formulas.D)
+
+    @property
+    def ratio(self) -> Any:
+        """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
+        return self.of_energy(energy_norms.largest_ratio)
+
+    def q_squared(self, theta: Any) -> Any:
+        """``q(theta)^2`` of the theorem in energy norms."""
+        return self.of_energy(lambda *constants: 1 - energy_norms.one_minus_square(theta, *constants))
 
     @property
     def A(self) -> Any:
@@ -153,20 +179,13 @@ class Reading(RightSides):
         """The factor of (5.11), by (5.16)."""
         return float(self.C_T * self.coercivity / self.A)
 
-    @cached_property
-    def P(self) -> float:
-        """The factor of (5.30)."""
-        return float(formulas.P(self.C_K, self.m, self.M, self.C_R, self.u))
+    def grows(self, formula: Callable[..., Any]) -> float:
+        return float(formula(self.C_K, self.m, self.M, self.C_R, self.u))
 
     @cached_property
     def Q(self) -> float:
         """The Lipschitz constant of T squared, as h_1 has it."""
         return float(formulas.Q(self.C_K, self.m, self.M, self.C_R))
-
-    @cached_property
-    def D(self) -> float:
-        """``C_T^2/C_R^2 - P``."""
-        return float(formulas.D(self.C_K, self.m, self.M, self.C_R, self.u))
 
     @cached_property
     def C_0(self) -> float:
@@ -193,17 +212,8 @@ class Reading(RightSides):
 
     def from_C0(self) -> tuple[float, ...]:
         """C_0 and the thetas above it inside the interval."""
-        C0, inside = float(formulas.C0(self.m, self.M, self.C_R)), self.contracting()
-        return (C0, *(theta for theta in inside if theta > C0)) if inside else ()
-
-    @property
-    def ratio(self) -> float:
-        """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
-        return float(energy_norms.largest_ratio(*self.energy))
-
-    def q_squared(self, theta: float) -> float:
-        """``q(theta)^2`` of the theorem in energy norms."""
-        return 1 - float(energy_norms.one_minus_square(theta, *self.energy))
+        inside = self.contracting()
+        return (self.C_0, *(theta for theta in inside if theta > self.C_0)) if inside else ()
 
 
 #: Numbers, or arrays of them.
@@ -215,7 +225,7 @@ above = lambda r: tuple(theta for theta in (1.5 * r.C_0, *THETAS) if r.C_0 < the
 below = lambda r: tuple(share * r.C_0 for share in (0.1, 0.5, 0.99))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Inequality:
     """``left <= right``, or ``left = right``, of the statement ``id``.
 
@@ -244,9 +254,10 @@ class Inequality:
     """
 
     id: str
-    of: Aspect = "printed"
     left: Side
     right: Side
+    _: KW_ONLY
+    of: Aspect = "printed"
     equality: bool = False
     about: Literal["pairs", "contraction", "bodies"] = "pairs"
     reading: Callable[[Reading], Reading] = lambda r: r
@@ -257,7 +268,7 @@ class Inequality:
     remark: str = ""
 
     def ratio(self, subject: Any, reading: Reading, theta: float = 0.0) -> Any:
-        """Left over right for a Difference or a Trial; an array for Differences.
+        """Left over right for a Trial or a Difference; an array for several of these.
 
         Negative terms change sides first, so that the ratio is at most 1 exactly where the inequality holds.  For an
         equality: 1 plus the difference over the energies.
@@ -287,24 +298,22 @@ def terms_of(side: Terms) -> tuple[Any, ...]:
     return side if isinstance(side, tuple) else (side,)
 
 
-def _editions(id: str, left: Side, right: Side, *, early: bool = False, **options: Any) -> list[Inequality]:
-    """An inequality that the lost 1/m reaches: as printed and repaired."""
-    read: Callable[[Reading], Reading] = (lambda r: r.bracket) if early else (lambda r: r.printed)
-    printed = Inequality(id=id, of="printed", left=left, right=right, reading=read, units=UNITS, **options)
-    return [printed, Inequality(id=id, of="repaired", left=left, right=right, **options)]
-
-
-def _by_traces(
+def _both(
     id: str,
     left: Side,
     right: Side,
-    reading: Callable[[Reading], Reading] = lambda r: r.by_half,
-    units: tuple[float, ...] = (1.0,),
+    reading: Callable[[Reading], Reading] = lambda r: r.printed,
+    units: tuple[float, ...] = UNITS,
     **options: Any,
 ) -> list[Inequality]:
-    """An inequality that rests on (5.13): with C_tr into H^1/2 as printed, and into L2(Gamma_c)."""
-    printed = Inequality(id=id, of="printed", left=left, right=right, reading=reading, units=units, **options)
-    return [printed, Inequality(id=id, of="repaired", left=left, right=right, **options)]
+    """An inequality as printed, with the constants as the paper reads them, and repaired."""
+    printed = Inequality(id, left, right, reading=reading, units=units, **options)
+    return [printed, Inequality(id, left, right, of="repaired", **options)]
+
+
+#: How the paper reads the constants: the lost 1/m in (5.30) to (5.33); (5.13) by C_tr into H^1/2, in any unit.
+EARLY: dict[str, Any] = {"reading": lambda r: r.bracket}
+BY_TRACES: dict[str, Any] = {"reading": lambda r: r.by_half, "units": (1.0,)}
 
 
 def _root(x: Any) -> Any:
@@ -317,7 +326,7 @@ def _lifts(b: Any, r: Reading, theta: float) -> Any:
     return [b.top(N, E) for N, E in zip(b.N, b.E, strict=True)]
 
 
-def _square_of_step(d: Difference, r: Reading, theta: float) -> float:
+def _square_of_step(d: Difference, r: Reading, theta: float) -> Any:
     return d.relaxed(theta) ** 2
 
 
@@ -328,129 +337,121 @@ ONE_TRACE_SPACE = "bodies whose grids differ have no common space of traces on w
 INEQUALITIES: tuple[Inequality, ...] = (
     # --- Section 4: only the two bodies
     Inequality(
-        id="4.7",
+        "4.7",
+        lambda b, r, _: [b.top(b.E[1], b.N[0]), b.top(b.E[0], b.N[1])],
+        lambda b, r, _: [1, 1],
         about="bodies",
         squares=True,
         one_grid=True,
-        left=lambda b, r, _: [b.top(b.E[1], b.N[0]), b.top(b.E[0], b.N[1])],
-        right=lambda b, r, _: [1, 1],
     ),
     Inequality(
-        id="4.7",
+        "4.7",
+        lambda b, r, _: [b.top(E, N) for E, N in zip(b.E, b.N, strict=True)],
+        lambda b, r, _: [1, 1],
         of="repaired",
         about="bodies",
         squares=True,
-        left=lambda b, r, _: [b.top(E, N) for E, N in zip(b.E, b.N, strict=True)],
-        right=lambda b, r, _: [1, 1],
     ),
-    Inequality(id="4.8", of="repaired", about="bodies", squares=True, left=_lifts, right=lambda b, r, _: b.contrast),
+    Inequality("4.8", _lifts, lambda b, r, _: b.contrast, of="repaired", about="bodies", squares=True),
     # by the constant between the norms of traces, which a mesh always has and the proof must supply
     Inequality(
-        id="prop-4.1.1",
+        "prop-4.1.1",
+        lambda b, r, _: [b.top(b.N[0], b.N[1]), b.top(b.N[1], b.N[0])],
+        lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=True)],
         of="repaired",
         about="bodies",
         squares=True,
         one_grid=True,
-        left=lambda b, r, _: [b.top(b.N[0], b.N[1]), b.top(b.N[1], b.N[0])],
-        right=lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=True)],
     ),
     Inequality(
-        id="prop-4.1.2",
+        "prop-4.1.2",
+        lambda b, r, _: b.across(b.N),
+        lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=False)],
         about="bodies",
         squares=True,
         remark=" (there of the contact body's lift alone, as nothing leads from its grid to the other one)",
-        left=lambda b, r, _: b.across(b.N),
-        right=lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=False)],
     ),
-    Inequality(id="x-continuity", about="bodies", left=lambda b, r, _: b.largest, right=lambda b, r, _: b.continuity),
-    Inequality(id="x-lift-bound", about="bodies", left=_lifts, right=lambda b, r, _: b.contrast),
+    Inequality("x-continuity", lambda b, r, _: b.largest, lambda b, r, _: b.continuity, about="bodies"),
+    Inequality("x-lift-bound", _lifts, lambda b, r, _: b.contrast, about="bodies"),
     # --- Section 5: two forces
-    *_by_traces("5.11", lambda d, r, _: d.size_1, lambda d, r, _: r.X * d.size_2),
-    Inequality(id="5.12", left=lambda d, r, _: d.energy_1, right=lambda d, r, _: (d.mixed_1, d.friction)),
+    *_both("5.11", lambda d, r, _: d.size_1, lambda d, r, _: r.X * d.size_2, **BY_TRACES),
+    Inequality("5.12", lambda d, r, _: d.energy_1, lambda d, r, _: (d.mixed_1, d.friction)),
+    Inequality("5.13", lambda d, r, _: d.friction, lambda d, r, _: r.C_K_half * (d.size_1 * d.size_2 + d.size_2**2)),
     Inequality(
-        id="5.13",
-        left=lambda d, r, _: d.friction,
-        right=lambda d, r, _: r.C_K_half * (d.size_1 * d.size_2 + d.size_2**2),
+        "5.13", lambda d, r, _: d.friction, lambda d, r, _: r.C_K * (d.size_1 * d.size_2 + d.size_2**2), of="repaired"
     ),
-    Inequality(
-        id="5.13",
-        of="repaired",
-        left=lambda d, r, _: d.friction,
-        right=lambda d, r, _: r.C_K * (d.size_1 * d.size_2 + d.size_2**2),
-    ),
-    *_by_traces(
+    *_both(
         "5.14",
         lambda d, r, _: r.m * d.size_1**2,
         lambda d, r, _: (r.A + r.C_K) * d.size_1 * d.size_2 + r.C_K * d.size_2**2,
+        **BY_TRACES,
     ),
-    *_by_traces(
+    *_both(
         "5.15",
         lambda d, r, _: r.m * (d.size_1 - (r.A + r.C_K) / (2 * r.m) * d.size_2) ** 2,
         lambda d, r, _: ((r.A + r.C_K) ** 2 / (4 * r.m) + r.C_K) * d.size_2**2,
+        **BY_TRACES,
     ),
-    *_by_traces("prop-5.4", lambda d, r, _: d.dual_T, lambda d, r, _: r.C_T * d.dual),
+    *_both("prop-5.4", lambda d, r, _: d.dual_T, lambda d, r, _: r.C_T * d.dual, **BY_TRACES),
     Inequality(
-        id="5.17",
+        "5.17",
+        lambda d, r, _: d.reaction @ d.setting.coordinates.T,
+        lambda d, r, _: -(d.d_1 @ d.setting.felt_1.T) @ d.setting.coordinates.T,
         equality=True,
-        left=lambda d, r, _: d.reaction @ d.setting.coordinates.T,
-        right=lambda d, r, _: -(d.d_1 @ d.setting.felt_1.T) @ d.setting.coordinates.T,
     ),
-    Inequality(id="5.18", left=lambda d, r, _: d.dual_T, right=lambda d, r, _: r.A * d.size_1),
-    Inequality(id="5.19", left=lambda d, r, _: d.size_2, right=lambda d, r, _: d.dual / r.m),
-    Inequality(id="5.22", left=lambda d, r, _: d.norm, right=lambda d, r, _: d.dual / _root(r.m)),
-    Inequality(id="5.23", left=lambda d, r, _: d.dual, right=lambda d, r, _: r.M / _root(r.m) * d.norm),
-    Inequality(id="x-root-M", left=lambda d, r, _: d.dual, right=lambda d, r, _: _root(r.M) * d.norm),
+    Inequality("5.18", lambda d, r, _: d.dual_T, lambda d, r, _: r.A * d.size_1),
+    Inequality("5.19", lambda d, r, _: d.size_2, lambda d, r, _: d.dual / r.m),
+    Inequality("5.22", lambda d, r, _: d.norm, lambda d, r, _: d.dual / _root(r.m)),
+    Inequality("5.23", lambda d, r, _: d.dual, lambda d, r, _: r.M / _root(r.m) * d.norm),
+    Inequality("x-root-M", lambda d, r, _: d.dual, lambda d, r, _: _root(r.M) * d.norm),
     Inequality(
-        id="5.24",
+        "5.24",
+        _square_of_step,
+        lambda d, r, t: t**2 * d.norm_T**2 + (1 - t) ** 2 * d.norm**2 + 2 * t * (1 - t) * d.inner,
         equality=True,
         thetas=everywhere,
-        left=_square_of_step,
-        right=lambda d, r, t: t**2 * d.norm_T**2 + (1 - t) ** 2 * d.norm**2 + 2 * t * (1 - t) * d.inner,
     ),
-    Inequality(id="5.25", equality=True, left=lambda d, r, _: d.inner, right=lambda d, r, _: d.mixed_2),
-    Inequality(id="5.26", equality=True, left=lambda d, r, _: d.mixed_2, right=lambda d, r, _: d.work),
-    Inequality(id="5.27", equality=True, left=lambda d, r, _: d.work, right=lambda d, r, _: -d.mixed_1),
-    Inequality(id="5.28", left=lambda d, r, _: -d.mixed_1, right=lambda d, r, _: (-d.energy_1, d.friction)),
-    Inequality(id="5.29", left=lambda d, r, _: -d.energy_1, right=lambda d, r, _: -r.give * d.norm_T**2),
-    *_editions("5.30", lambda d, r, _: d.friction, lambda d, r, _: r.P * d.norm**2, early=True),
-    *_editions("5.31", lambda d, r, _: d.inner, lambda d, r, _: (-r.give * d.norm_T**2, r.P * d.norm**2), early=True),
+    Inequality("5.25", lambda d, r, _: d.inner, lambda d, r, _: d.mixed_2, equality=True),
+    Inequality("5.26", lambda d, r, _: d.mixed_2, lambda d, r, _: d.work, equality=True),
+    Inequality("5.27", lambda d, r, _: d.work, lambda d, r, _: -d.mixed_1, equality=True),
+    Inequality("5.28", lambda d, r, _: -d.mixed_1, lambda d, r, _: (-d.energy_1, d.friction)),
+    Inequality("5.29", lambda d, r, _: -d.energy_1, lambda d, r, _: -r.give * d.norm_T**2),
+    *_both("5.30", lambda d, r, _: d.friction, lambda d, r, _: r.P * d.norm**2, **EARLY),
+    *_both("5.31", lambda d, r, _: d.inner, lambda d, r, _: (-r.give * d.norm_T**2, r.P * d.norm**2), **EARLY),
     *(
         inequality
-        for id, early in (("5.32", True), ("5.33", True), ("5.36", False))
-        for inequality in _editions(
+        for id, read in (("5.32", EARLY), ("5.33", EARLY), ("5.36", {}))
+        for inequality in _both(
             id,
             _square_of_step,
             lambda d, r, t: (r.weight(t) * d.norm_T**2, r.h_2(t) * d.norm**2),
-            early=early,
+            **read,
             thetas=everywhere,
         )
     ),
-    *_by_traces(
+    *_both(
         "5.38",
         lambda d, r, t: r.weight(t) * d.norm_T**2,
         lambda d, r, t: r.weight(t) * (r.C_T * r.M / r.m) ** 2 * d.norm**2,
         reading=lambda r: r.by_half.printed,
-        units=UNITS,
         thetas=above,
     ),
-    *_editions("5.39", _square_of_step, lambda d, r, t: r.h_1(t) * d.norm**2, thetas=above),
-    *_editions("5.44", _square_of_step, lambda d, r, t: r.h_2(t) * d.norm**2, thetas=below),
-    Inequality(id="x-reaction", left=lambda d, r, _: d.norm_T**2, right=lambda d, r, _: r.energy[0] * d.energy_1),
+    *_both("5.39", _square_of_step, lambda d, r, t: r.h_1(t) * d.norm**2, thetas=above),
+    *_both("5.44", _square_of_step, lambda d, r, t: r.h_2(t) * d.norm**2, thetas=below),
+    Inequality("x-reaction", lambda d, r, _: d.norm_T**2, lambda d, r, _: r.energy[0] * d.energy_1),
     Inequality(
-        id="x-friction-energy",
-        left=lambda d, r, _: d.friction,
-        right=lambda d, r, _: r.energy[1] * _root(d.energy_1) * d.norm + r.energy[2] * d.norm**2,
+        "x-friction-energy",
+        lambda d, r, _: d.friction,
+        lambda d, r, _: r.energy[1] * _root(d.energy_1) * d.norm + r.energy[2] * d.norm**2,
     ),
-    Inequality(id="x-ratio", left=lambda d, r, _: _root(d.energy_1), right=lambda d, r, _: r.ratio * d.norm),
-    Inequality(
-        id="x-energy", thetas=everywhere, left=_square_of_step, right=lambda d, r, t: r.q_squared(t) * d.norm**2
-    ),
+    Inequality("x-ratio", lambda d, r, _: _root(d.energy_1), lambda d, r, _: r.ratio * d.norm),
+    Inequality("x-energy", _square_of_step, lambda d, r, t: r.q_squared(t) * d.norm**2, thetas=everywhere),
     # --- Proposition 5.6.  (1 - K^2)/theta e^2 <= (e^2 - |||T_theta psi - T_theta psi~|||^2)/theta: nothing of 1 - K
     # is lost to rounding where theta is small
     *(
         inequality
         for id, thetas in (("prop-5.6.1", Reading.from_C0), ("x-merged-interval", Reading.contracting))
-        for inequality in _editions(
+        for inequality in _both(
             id,
             lambda d, r, t: r.gain(t) / t * d.norm**2,
             lambda d, r, t: 2 * (d.norm**2 - d.inner) - t * d.step**2,
@@ -458,7 +459,7 @@ INEQUALITIES: tuple[Inequality, ...] = (
             thetas=thetas,
         )
     ),
-    *_editions(
+    *_both(
         "5.47",
         lambda d, r, t: d.relaxed(t),
         lambda d, r, t: math.sqrt(1 - r.gain(t)) * d.norm,

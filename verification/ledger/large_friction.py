@@ -6,9 +6,10 @@ term grows as k^2; the printed bound grows as k where the unit makes its bracket
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 from scipy.linalg import eigh
@@ -17,10 +18,9 @@ from fem1d2d.mesh import Floats
 from verification.interface.pair import ContactPair
 from verification.ledger.cases import three_digits
 from verification.ledger.differences import Difference, DrawnSetting, along, between, uniform_piece
-from verification.ledger.evidence import Evidence, Level, figure
+from verification.ledger.evidence import Evidence, Level, Watch, figure, source
 from verification.ledger.inequalities import SEED, Reading
 from verification.ledger.worst import Trial, draw_cases
-from verification.machine.threads import one_thread
 from verification.semidefinite.losses import square
 
 #: Random problems, beside the named ones.
@@ -124,20 +124,14 @@ def _with_friction(pair: ContactPair, k: Fraction) -> ContactPair:
     return replace(pair.at(friction=k), interface=interface, problem=None)
 
 
-def large_friction(
-    ids: Collection[str], level: Level, watch: Callable[[float], None] = lambda share: None
-) -> dict[str, list[Evidence]]:
-    """Break what is printed on each of some problems: a ``Source``, which takes 6 random ones or, at full, 60."""
-    wanted = [id for id in IDS if id in ids]
+def witnesses(level: Level, watch: Watch) -> list[Witness]:
+    """Break what is printed on each of some problems, on 6 random ones or, at full, 60."""
+    cases = [(case, random) for case, random in draw_cases(COUNT[level]) if case.measured.of_friction]
     found: list[Witness] = []
-    if wanted:
-        with one_thread():
-            cases = [(case, random) for case, random in draw_cases(COUNT[level]) if case.measured.of_friction]
-            for case, random in cases:
-                found.append(witness(case, random))
-                watch(len(found) / len(cases))
-    watch(1.0)
-    return {id: _evidence(id, found) for id in wanted}
+    for case, random in cases:
+        watch(len(found) / len(cases))
+        found.append(witness(case, random))
+    return found
 
 
 def _evidence(id: str, found: Sequence[Witness]) -> list[Evidence]:
@@ -168,3 +162,7 @@ def _evidence(id: str, found: Sequence[Witness]) -> list[Evidence]:
         Evidence(method="discrete", of="printed", holds=min(printed) <= 1, text=of_printed, data=data),
         Evidence(method="discrete", of="repaired", holds=repaired <= 1, text=of_repaired, data=more),
     ]
+
+
+#: Evidence that the printed bound fails on any pair of bodies.
+large_friction = source({id: partial(_evidence, id) for id in IDS}, witnesses)

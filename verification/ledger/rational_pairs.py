@@ -24,6 +24,7 @@ from verification.interface.body import Condensed, material_of
 from verification.interface.pair import pair_from
 from verification.ledger.cases import rectangle
 from verification.ledger.evidence import Evidence, source
+from verification.ledger.inequalities import ENTRIES, terms_of
 from verification.problem.specification import Problem
 
 #: Rationals.
@@ -198,31 +199,31 @@ def _number(product: Any) -> Fraction:
     return Fraction(product)
 
 
-Sides = Callable[[RationalPair], tuple[Any, Any]]
-
-#: Both sides of an equality: numbers or vectors.
-EQUAL: Mapping[str, Sides] = {
+#: Both sides of equalities between squares of norms, and between vectors; the search has the other formulas.
+OWN: Mapping[str, Callable[[RationalPair], tuple[Any, Any]]] = {
     "5.17": lambda d: (d.reaction, -d.one.energy @ d.d_1),
     "5.24": lambda d: (
         d.relaxed(THETA),
         THETA**2 * d.square(d.reaction) + (1 - THETA) ** 2 * d.square(d.force) + 2 * THETA * (1 - THETA) * d.inner,
     ),
-    "5.25": lambda d: (d.inner, d.mixed_2),
-    "5.26": lambda d: (d.mixed_2, d.work),
-    "5.27": lambda d: (d.work, -d.mixed_1),
 }
 
-#: Left is to be at most right.
-AT_MOST: Mapping[str, Sides] = {
-    "5.12": lambda d: (d.energy_1, d.mixed_1 + d.friction),
-    "5.28": lambda d: (-d.mixed_1, d.friction - d.energy_1),
-}
+#: The equalities, and the inequalities that come close to one.
+IDS = (*OWN, "5.25", "5.26", "5.27", "5.12", "5.28")
 
 
-def decide(pair: RationalPair, id: str) -> Evidence:
+def both_sides(id: str, pair: RationalPair) -> tuple[Any, Any]:
+    """Both sides: numbers or vectors."""
+    if id in OWN:
+        return OWN[id](pair)
+    left, right = ENTRIES[id, "printed"].left, ENTRIES[id, "printed"].right
+    return sum(terms_of(left(pair, None, None))), sum(terms_of(right(pair, None, None)))
+
+
+def decided(id: str, pair: RationalPair) -> list[Evidence]:
     """The evidence of an equality or inequality; nothing is rounded, so that there always is some."""
-    left, right = EQUAL[id](pair) if id in EQUAL else AT_MOST[id](pair)
-    holds = bool(np.all(left == right) if id in EQUAL else left <= right)
+    left, right = both_sides(id, pair)
+    holds = bool(np.all(left == right) if ENTRIES[id, "printed"].equality else left <= right)
     apart = max(map(abs, np.atleast_1d(left - right)))
     said = "both sides are equal" if not apart else f"left {'<' if np.all(left <= right) else '>'} right"
     states = "; ".join(solution.state for solution in pair.solutions)
@@ -234,12 +235,8 @@ def decide(pair: RationalPair, id: str) -> Evidence:
         "difference": str(apart),
     }
     text = f"{said} ({where}), computed in rationals"
-    return Evidence(method="verified", of="printed", holds=holds, text=text, data=data)
-
-
-def _decided(id: str, pair: RationalPair) -> list[Evidence]:
-    return [decide(pair, id)]
+    return [Evidence(method="verified", of="printed", holds=holds, text=text, data=data)]
 
 
 #: Equalities on one pair of bodies, decided in rationals, the same at both levels.
-in_rationals = source({id: partial(_decided, id) for id in (*EQUAL, *AT_MOST)}, lambda level: RationalPair())
+in_rationals = source({id: partial(decided, id) for id in IDS}, lambda level, watch: RationalPair())

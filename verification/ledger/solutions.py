@@ -256,4 +256,4 @@ CHECKS: dict[str, Check] = {
 
 #: Evidence for statements about solutions, iterates and their limit.  Full halves the meshes too, draws problems at
 #: random and runs to the end.
-solutions = source(CHECKS, lambda level: RunsOfLevel(level=level))
+solutions = source(CHECKS, lambda level, watch: RunsOfLevel(level=level))

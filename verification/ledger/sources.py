@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from functools import partial
 
 from ndtheory.symbolic.checks import checks
 from ndtheory.symbolic.dimension import consistent
 from ndtheory.symbolic.symbols import DIMENSIONS
 from verification.ledger.enclosures import enclosed
-from verification.ledger.evidence import Evidence, Level, Method, Source
+from verification.ledger.evidence import Evidence, Method, Source, source
 from verification.ledger.experiments import experiments
 from verification.ledger.large_friction import large_friction
 from verification.ledger.rational_pairs import in_rationals
@@ -16,12 +16,9 @@ from verification.ledger.solutions import solutions
 from verification.ledger.worst import discrete
 
 
-def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) -> dict[str, list[Evidence]]:
-    """Gather symbolic evidence and compare units: a ``Source``, the same at both levels."""
-    found: dict[str, list[Evidence]] = {}
-    chosen = [check for check in checks() if check.id in ids]
-    for i, check in enumerate(chosen):
-        entries = found.setdefault(check.id, [])
+def _exact(id: str, given: object) -> list[Evidence]:
+    entries = []
+    for check in (each for each in checks() if each.id == id):
         for of, form in check.forms.items():
             decision = check.decide(form)
             data = {"counterexample": dict(decision.counterexample)} if decision.counterexample else {}
@@ -34,9 +31,11 @@ def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) ->
             differ = consistent(relations, DIMENSIONS)
             text = "both sides have one unit" if differ is None else f"units differ: {differ}"
             entries.append(Evidence(method="dimension", of=of, holds=differ is None, text=text))
-        watch((i + 1) / len(chosen))
-    return found
+    return entries
 
+
+#: Symbolic evidence and units, the same at both levels.
+exact = source({check.id: partial(_exact, check.id) for check in checks()}, lambda level, watch: None)
 
 #: By the name that progress messages have.
 SOURCES: dict[str, Source] = {

@@ -29,8 +29,7 @@ from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
 from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair, pair_from
-from verification.ledger.cases import PROBLEMS, drawn
-from verification.ledger.curves import curved
+from verification.ledger.cases import PROBLEMS, curved, drawn
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.problem.specification import Problem
 
@@ -114,6 +113,16 @@ class Weak:
     def bound(self, two: Floats) -> Floats:
         """``w_j k |S sigma_N|`` at the contact nodes, sigma_N that of body 2."""
         return self.pair.bound(self.force(self.two, two))
+
+    @cached_property
+    def _riesz(self) -> Any:
+        return solver(self.two.gram_matrix)
+
+    def dual(self, force: Floats) -> float:
+        """The norm of nodal forces on Gamma_c in the dual of V^2, from the whole Gram matrix."""
+        load = np.zeros(len(self.two.positions))
+        load[self.two.interface] = self.pair.neumann.orient(force)
+        return float(np.sqrt(max(float(load @ self._riesz(load)), 0.0)))
 
     def energy(self, fields: Fields) -> Floats:
         """``sqrt(a(v, v))`` of the unknowns, for each column."""

@@ -17,7 +17,7 @@ from verification.constants import Measured, measure
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.cases import NAMED, problem
-from verification.ledger.differences import Differences, DrawnSetting, draw_pairs
+from verification.ledger.differences import Difference, DrawnSetting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
 from verification.ledger.inequalities import (
     ALLOWANCE,
@@ -73,31 +73,15 @@ class Trial:
         """The norms squared of H^1/2(Gamma_c)."""
         return self.setting.forms.E_1, self.setting.forms.E_2
 
-    @cached_property
-    def spectra(self) -> list[tuple[float, float]]:
-        """Extremal eigenvalues of (A_a, H_a) from the whole spectrum of a dense pencil."""
-        spectra = [eigvalsh(body.stiffness.toarray(), body.gram_matrix.toarray()) for body in self.bodies]
-        return [(float(values[0]), float(values[-1])) for values in spectra]
-
-    @property
-    def m(self) -> list[float]:
-        """m^a."""
-        return [getattr(self.measured, body.name).m.value for body in self.bodies]
-
-    @property
-    def M(self) -> list[float]:
-        """M^a."""
-        return [getattr(self.measured, body.name).M.value for body in self.bodies]
-
     @property
     def contrast(self) -> list[float]:
         """``M^a/m^a``."""
-        return [M / m for M, m in zip(self.M, self.m, strict=True)]
+        return [one.M.value / one.m.value for one in (getattr(self.measured, body.name) for body in self.bodies)]
 
-    @property
+    @cached_property
     def largest(self) -> list[float]:
-        """M^a from the whole spectrum."""
-        return [largest for _, largest in self.spectra]
+        """M^a from the whole spectrum of a dense pencil."""
+        return [float(eigvalsh(each.stiffness.toarray(), each.gram_matrix.toarray())[-1]) for each in self.bodies]
 
     @property
     def continuity(self) -> list[float]:
@@ -150,7 +134,7 @@ class WorstTally:
     by_unit: dict[float, tuple[float, str, float | None, str]] = field(default_factory=dict)
     worst_apart: float = -math.inf
 
-    def take(self, case: Trial, subjects: Trial | Differences) -> None:
+    def take(self, case: Trial, subjects: Trial | Difference) -> None:
         """Compare both sides on the pairs of a problem, unless the inequality needs one grid and there are two."""
         inequality = self.inequality
         if inequality.one_grid and case.grids_differ:
@@ -278,7 +262,7 @@ def discrete(
     return result
 
 
-def pairs_of(case: Trial, random: np.random.Generator, *, starts: int, realised: int) -> Differences:
+def pairs_of(case: Trial, random: np.random.Generator, *, starts: int, realised: int) -> Difference:
     """The pairs of a problem; a named one has no loads worth trying."""
     realised = 0 if case.name in NAMED else realised
-    return Differences(list(draw_pairs(case.setting, random, starts=starts, realised=realised)))
+    return Difference.of(list(draw_pairs(case.setting, random, starts=starts, realised=realised)))

@@ -71,7 +71,7 @@ def refuted(rows: Sequence[Row]) -> bool:
     return rows[0]["outcome"] not in FAILED and curve_of("", rows).cost > SERVES
 
 
-def decide(claim: Claim, runs: Runs, meshes: Collection[int] | None = None) -> Outcome:
+def judged(claim: Claim, runs: Runs, meshes: Collection[int] | None = None) -> Outcome:
     """The outcome of a claim on steps over theta in one reading; its true closeness is at most the one given.
 
     ``meshes`` are the halvings of the mesh of 60 nodes to run, by default all of the claim.  A reading that they do not

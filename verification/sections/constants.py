@@ -45,7 +45,6 @@ def sections(measured: Measured) -> Sections:
     parts: list[Shown] = []
     if measured.unverified is not None:
         parts += [part for level in levels for part in _between_bounds(level, (*NAMES, *ENERGY_NAMES))]
-        ends = "verified: between two bounds proved for the exact data of the file on this mesh, rounding included."
     else:
         unit = _units(measured)
         words = WORDS if len(levels) == 1 else {}  # several columns leave no room
@@ -60,8 +59,12 @@ def sections(measured: Measured) -> Sections:
         ]
         head = ("nodes", *(str(level.nodes) for level in levels), "unit", *([""] if words else []))
         parts.append(table(head, rows, right=range(1, len(levels) + 1)))
-        ends = "For this mesh: no discretisation error, but rounding. For theta only rho_max matters."
     parts.append(_cells(measured))
+    numbers = [getattr(level, name) for level in levels for name in (*NAMES, *ENERGY_NAMES)]
+    if any(number is not None and number.level == "verified" for number in numbers):
+        ends = "verified: between two bounds proved for the exact data of the file on this mesh, rounding included."
+    else:
+        ends = "For this mesh: no discretisation error, but rounding. For theta only rho_max matters."
     for reason in dict.fromkeys(measured.reason.values()):
         names = ", ".join(name for name, why in measured.reason.items() if why == reason)
         parts.append(Note(f"{names}: {reason}"))

@@ -18,16 +18,7 @@ from scipy.linalg import eigh
 
 from verification.ledger import inequalities
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import (
-    Difference,
-    Differences,
-    DrawnSetting,
-    along,
-    between,
-    directions,
-    pieces,
-    uniform_piece,
-)
+from verification.ledger.differences import Difference, DrawnSetting, along, between, directions, pieces, uniform_piece
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
 from verification.ledger.worst import Trial, WorstTally, discrete, draw_cases, pairs_of
@@ -319,7 +310,7 @@ MUTANTS: list[tuple[str, str, str, Callable[[Any, Reading, float], Any]]] = [
     ("prop-4.1.2", "printed", "no M/m", lambda b, r, t: b.across(b.E)),
     ("prop-4.1.2", "printed", "one trace norm", lambda b, r, t: b.contrast),
     ("x-continuity", "printed", "2 mu", lambda b, r, t: np.array([2 * body.material.lame_mu for body in b.bodies])),
-    ("x-lift-bound", "printed", "its root", lambda b, r, t: np.sqrt(np.array(b.M) / np.array(b.m)) / 2),
+    ("x-lift-bound", "printed", "its root", lambda b, r, t: np.sqrt(b.contrast) / 2),
     ("5.11", "printed", "no C_K", lambda d, r, t: r.A / r.m * d.size_2),
     ("5.12", "printed", "no friction term", lambda d, r, t: d.mixed_1),
     ("5.12", "printed", "friction with its sign flipped", lambda d, r, t: (d.mixed_1, -d.friction)),
@@ -390,9 +381,9 @@ def test_what_cannot_be_compared_is_not_called_true(id, side):
     piece = uniform_piece(case.pair, touching=True, sliding=0)
     pair = along(case.setting, piece, np.ones(case.pair.contact.grid.n * 2))
     tally = WorstTally(inequality=replace(entry, **{side: nan}))
-    tally.take(case, case if entry.about == "bodies" else Differences([pair]))
+    tally.take(case, case if entry.about == "bodies" else Difference.of([pair]))
     tally.inequality = entry  # what follows does not cover it up
-    tally.take(case, case if entry.about == "bodies" else Differences([pair]))
+    tally.take(case, case if entry.about == "bodies" else Difference.of([pair]))
     assert tally.evidence.holds is False
     assert tally.evidence.data["worst_ratio"] is None
 

@@ -20,8 +20,8 @@ from verification.ledger.enclosures import (
     ROLLERS,
     EnclosedBodies,
     EnclosedConstants,
-    decide,
     enclosed,
+    on_bodies,
     place,
 )
 from verification.ledger.inequalities import INEQUALITIES
@@ -115,7 +115,7 @@ def test_a_right_side_that_is_too_small_is_refuted_and_one_that_is_large_enough_
     own = enclosures.both_sides
     scaled = lambda *given: [(left, right * factor) for left, right in own(*given)]
     monkeypatch.setattr(enclosures, "both_sides", scaled)
-    assert decide(bodies[place(key)], *key).holds is holds
+    assert on_bodies(bodies[place(key)], *key).holds is holds
 
 
 def test_the_energy_of_sticking_nodes_lies_between_its_bounds(bodies):
@@ -146,7 +146,7 @@ def test_a_step_is_bounded_below_C_2_alone(bodies):
 
 def test_where_the_enclosures_overlap_nothing_is_said(bodies, monkeypatch):
     monkeypatch.setattr(enclosures, "both_sides", lambda d, r, key: [(d.norm.square(), d.norm.square())])
-    assert decide(bodies[PLATE], "5.11", "repaired") is None
+    assert on_bodies(bodies[PLATE], "5.11", "repaired") is None
 
 
 def test_what_cannot_be_enclosed_is_not_decided(bodies, monkeypatch):
@@ -154,7 +154,7 @@ def test_what_cannot_be_enclosed_is_not_decided(bodies, monkeypatch):
         raise ArithmeticError("made up")
 
     monkeypatch.setattr(enclosures, "both_sides", fail)
-    assert decide(bodies[PLATE], "5.11", "repaired") is None
+    assert on_bodies(bodies[PLATE], "5.11", "repaired") is None
 
 
 def test_an_interval_has_the_two_powers_that_the_inequalities_take():

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.ledger.rational_pairs import AT_MOST, EQUAL, FORCES, RationalPair, decide, in_rationals, solved
+from verification.ledger import rational_pairs
+from verification.ledger.inequalities import ENTRIES
+from verification.ledger.rational_pairs import FORCES, IDS, RationalPair, both_sides, decided, in_rationals, solved
 
 
 @pytest.fixture(scope="module")
@@ -14,9 +16,13 @@ def pair():
     return RationalPair()
 
 
+EQUAL = [id for id in IDS if ENTRIES[id, "printed"].equality]
+AT_MOST = [id for id in IDS if id not in EQUAL]
+
+
 @pytest.mark.parametrize("id", EQUAL)
 def test_both_sides_of_an_equality_are_one_rational(pair, id):
-    evidence = decide(pair, id)
+    (evidence,) = decided(id, pair)
     assert (evidence.method, evidence.of, evidence.holds) == ("verified", "printed", True)
     assert evidence.data["difference"] == "0"
 
@@ -24,23 +30,23 @@ def test_both_sides_of_an_equality_are_one_rational(pair, id):
 @pytest.mark.parametrize("id", AT_MOST)
 def test_an_inequality_between_rationals_is_strict_where_nodes_change_their_state(pair, id):
     assert len({solution.state for solution in pair.solutions}) == 2
-    left, right = AT_MOST[id](pair)
+    left, right = both_sides(id, pair)
     assert left < right
-    assert decide(pair, id).holds
+    assert decided(id, pair)[0].holds
 
 
 @pytest.mark.parametrize("id", EQUAL)
 def test_an_equality_that_is_off_by_a_billionth_is_refuted(pair, id, monkeypatch):
-    sides = EQUAL[id]
-    monkeypatch.setitem(EQUAL, id, lambda d: (sides(d)[0], sides(d)[1] * (1 + Fraction(1, 10**9))))
-    assert decide(pair, id).holds is False
+    left, right = both_sides(id, pair)
+    monkeypatch.setattr(rational_pairs, "both_sides", lambda *of: (left, right * (1 + Fraction(1, 10**9))))
+    assert decided(id, pair)[0].holds is False
 
 
 @pytest.mark.parametrize("id", AT_MOST)
 def test_an_inequality_without_its_friction_term_is_refuted(pair, id, monkeypatch):
-    sides = AT_MOST[id]
-    monkeypatch.setitem(AT_MOST, id, lambda d: (sides(d)[0], sides(d)[1] - 100 * d.friction))
-    assert decide(pair, id).holds is False
+    left, right = both_sides(id, pair)
+    monkeypatch.setattr(rational_pairs, "both_sides", lambda *of: (left, right - 100 * pair.friction))
+    assert decided(id, pair)[0].holds is False
 
 
 def test_the_rational_bodies_and_solutions_are_those_of_the_program(pair):

@@ -13,7 +13,7 @@ from verification.output.folder import Folder
 from verification.reproduce import FIGURES, READINGS, reproduce
 from verification.reproduce.claims import CLAIMS, OPTIMUM, Curve, curves_hold, share_as_printed, zones, zones_hold
 from verification.reproduce.experiments import THETAS, Outcome, Reproduction, Result, outcome_of, shared
-from verification.reproduce.refutation import Runs, decide
+from verification.reproduce.refutation import Runs, judged
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.sweep import sweep_grid
 from verification.sweeps.workers import alone
@@ -194,7 +194,7 @@ class Counted:
 )
 def test_a_reading_is_refuted_by_a_theta_that_takes_too_few_steps_and_by_no_other(steps, others, holds, runs):
     made = Counted(steps, others)
-    found = decide(OPTIMUM, Runs(CLAMPED, made))
+    found = judged(OPTIMUM, Runs(CLAMPED, made))
     assert found.holds is holds
     assert runs is None or len(made.asked) == runs
     every = [row(theta, steps.get(float(theta), others)) for theta in THETAS]
@@ -206,14 +206,14 @@ def test_a_curve_whose_run_at_0_6_failed_leaves_it_to_the_others_to_refute():
     fails = lambda values: "friction" not in values and float(values["theta"]) == 0.6
     best = lambda values: 20 if float(values["theta"]) == 0.6 else 10
     run = lambda values: row(values["theta"], best(values), "error" if fails(values) else "converged")
-    assert decide(CLAIMS["fig11"], Runs(CLAMPED, run)).holds is False
-    assert decide(OPTIMUM, Runs(CLAMPED, run)).holds is None
+    assert judged(CLAIMS["fig11"], Runs(CLAMPED, run)).holds is False
+    assert judged(OPTIMUM, Runs(CLAMPED, run)).holds is None
 
 
 def test_figures_share_the_runs_of_the_curve_that_they_have_in_common():
     made = Counted({0.65: 10}, 20)
     runs = Runs(CLAMPED, made)
-    assert [decide(claim, runs).holds for claim in (*CURVES, OPTIMUM)] == [False] * 4
+    assert [judged(claim, runs).holds for claim in (*CURVES, OPTIMUM)] == [False] * 4
     assert len(made.asked) == 2
 
 
@@ -234,18 +234,18 @@ def test_figures_make_the_rows_of_that_curve_once_and_they_are_those_that_each_w
 
 def test_meshes_that_are_not_run_leave_a_figure_undecided_and_refute_it_as_well():
     fine = lambda values: row(values["theta"], 20 if values["refine"] < 3 or float(values["theta"]) == 0.95 else 40)
-    figure_10 = lambda **meshes: decide(CLAIMS["fig10"], Runs(CLAMPED, fine), **meshes)
+    figure_10 = lambda **meshes: judged(CLAIMS["fig10"], Runs(CLAMPED, fine), **meshes)
     assert figure_10().holds is False
     assert figure_10(meshes=[0, 1, 2]).holds is None
     assert figure_10(meshes=[3]).holds is False
     alike = lambda values: row(values["theta"], 20 + 4 * values["refine"])
-    assert decide(CLAIMS["fig10"], Runs(CLAMPED, alike)).holds is False  # 32 steps on the finest, 20 on the coarsest
+    assert judged(CLAIMS["fig10"], Runs(CLAMPED, alike)).holds is False  # 32 steps on the finest, 20 on the coarsest
 
 
 @pytest.mark.parametrize("reading", [CLAMPED, READINGS[5]], ids=lambda reading: reading.name)
 def test_early_refutation_says_of_a_reading_what_all_its_runs_say(reading):
     (result,) = reproduce(["fig12"], readings=[reading]).results
-    early = decide(CLAIMS["fig12"], Runs(reading))
+    early = judged(CLAIMS["fig12"], Runs(reading))
     assert early.holds is result.outcomes[0].holds
     assert early.closeness >= result.outcomes[0].closeness
     whole = {curve.label: curve for curve in result.outcomes[0].curves}
