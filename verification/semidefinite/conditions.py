@@ -141,12 +141,11 @@ class Conditions:
         return (total + total.T) / 2
 
     def inner(self, one: Floats, other: Floats) -> Floats:
-        """The inner product of two linear forms in the norm of the factor, symmetric.
+        """The inner product of two linear forms in the norm of the factor: (5.21), Euclidean in these coordinates.
 
-        This is (5.21), Euclidean in these coordinates.  Programs have that norm from here, their check from S_2.
+        Programs have that norm from here, their check from S_2.
         """
-        form = one.T @ other
-        return np.asarray(form + form.T) / 2
+        return np.asarray(one.T @ other)
 
     @property
     def free(self) -> Floats:
@@ -156,12 +155,13 @@ class Conditions:
     @property
     def cross(self) -> Floats:
         """The form ``<g, p>``."""
-        return self.inner(self.g, self.p)
+        cross = self.inner(self.g, self.p)
+        return np.asarray(cross + cross.T) / 2
 
-    def after(self, theta: float) -> Floats:
-        """The form ``|theta p + (1 - theta) g|^2``: what one step leaves."""
+    def fixed(self, theta: float) -> Floats:
+        """The form ``-|theta p + (1 - theta) g|^2``: what is left of a difference of forces after one step."""
         step = theta * self.p + (1 - theta) * self.g
-        return self.inner(step, step)
+        return self.inner(-step, step)
 
     def square_from_below(self, found: Optimum) -> np.polynomial.Polynomial:
         """A parabola in theta below the square of the factor that a program at any theta can prove, from one program.

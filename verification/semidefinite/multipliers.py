@@ -147,7 +147,7 @@ class QuadraticForms(Conditions):
         ------
         LMIError
         """
-        fixed, start = -self.after(theta), None
+        fixed, start = self.fixed(theta), None
         if parent is not None and parent[1].early is not None:
             start = self.started(fixed, parent[1].early, parent[0], pieces)
         holds = lambda weights: self.traces.with_multipliers(weights, step=(theta, 1 - theta))
@@ -157,7 +157,7 @@ class QuadraticForms(Conditions):
     @one_thread()
     def proved_by(self, multipliers: Weights, theta: float) -> Certified | None:
         """The least Lipschitz constant of T_theta on some pieces that given multipliers prove; None if they do not."""
-        evaluated = self._least_value(-self.after(theta) - self.conditions(multipliers))
+        evaluated = self._least_value(self.fixed(theta) - self.conditions(multipliers))
         if evaluated is None:
             return None
         holds = self.traces.with_multipliers(multipliers, step=(theta, 1 - theta))
