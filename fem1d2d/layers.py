@@ -135,7 +135,7 @@ class Layer:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interface:
+class FacingLayers:
     """Two layers with a common surface, and the mortar transfer between their grids.
 
     Both layers are described as bodies below their surface, the upper one as its mirror image: equal cells and equal
@@ -212,7 +212,7 @@ class Peak(NamedTuple):
     ratio: float
 
 
-def peaks(interface: Interface, *, rounds: int = 2) -> tuple[Peak, Peak]:
+def peaks(interface: FacingLayers, *, rounds: int = 2) -> tuple[Peak, Peak]:
     """The waves of the largest rho and rho_N on two layers, in doubles, sought among finitely many waves.
 
     Each round after the first one divides the distance of waves by eight.
@@ -223,7 +223,7 @@ def peaks(interface: Interface, *, rounds: int = 2) -> tuple[Peak, Peak]:
 
     >>> from fem1d2d import plane_strain
     >>> flat, tall = (Layer(material=plane_strain(2.6, 0.3), aspect=aspect) for aspect in (1.0, 0.5))
-    >>> [round(peak.ratio, 4) for peak in peaks(Interface(contact=tall, neumann=flat))]
+    >>> [round(peak.ratio, 4) for peak in peaks(FacingLayers(contact=tall, neumann=flat))]
     [2.3548, 1.291]
     """
     phases = np.linspace(0.0, np.pi, FIRST + 1)  # at 2 pi - phase there are the conjugate waves

@@ -61,12 +61,12 @@ SHORTEST = Fraction(1, 2**24)
 POWERS = (1, 1, 0, 0)
 
 
-class Unproved(ArithmeticError):
+class Undecided(ArithmeticError):
     """An inequality that the balls do not decide."""
 
 
 @dataclass(frozen=True)
-class Piece:
+class Stretch:
     """Wave numbers between two, and X with ``(1 - eps) X <= s <= (1 + eps) X`` there, from t = -1 to t = 1.
 
     From 0 on, X is constant, and the enclosure is that of ``D^-1 s D^-1`` with ``D = diag(xi^(POWERS/2))``.
@@ -208,7 +208,7 @@ def surface(K: Any) -> tuple[Any, Any]:
         A = ((A + A.transpose()) * arb("0.5")).mid()
         if _norm(change) < arb(2) ** (-BITS + 20):
             return A, (-(first_C + A).solve(first_B.transpose())).mid()
-    raise Unproved(f"{BITS} doublings of the rows do not give the stiffness of a half-plane")
+    raise Undecided(f"{BITS} doublings of the rows do not give the stiffness of a half-plane")
 
 
 @lru_cache(maxsize=8)
@@ -279,7 +279,7 @@ def proves(K: Poly, X: Poly, E: Poly, lo: Fraction, hi: Fraction) -> bool:
 
 
 def _divided(p: Poly) -> Poly:
-    """``D^-1 p D^-1`` with ``D = diag((xi/xi_0)^POWERS)``; Unproved if a coefficient does not vanish as it must."""
+    """``D^-1 p D^-1`` with ``D = diag((xi/xi_0)^POWERS)``; Undecided if a coefficient does not vanish as it must."""
     found = [c * 0 for c in p]
     for i, a in enumerate(POWERS):
         for j, b in enumerate(POWERS):
@@ -287,13 +287,13 @@ def _divided(p: Poly) -> Poly:
                 if k >= a + b:
                     found[k - a - b][i, j] = c[i, j]
                 elif not c[i, j].contains(0):
-                    raise Unproved(f"coefficient {k} of entry {i}, {j} is {c[i, j]}")
+                    raise Undecided(f"coefficient {k} of entry {i}, {j} is {c[i, j]}")
     return found
 
 
 @lru_cache(maxsize=32)
-def pieces(aspect: Fraction, modulus: Fraction) -> tuple[Piece, ...]:
-    """s enclosed for all ``0 < xi <= pi/2``, in pieces from the first one on, G = 1; Unproved if a piece is too short.
+def pieces(aspect: Fraction, modulus: Fraction) -> tuple[Stretch, ...]:
+    """s enclosed for all ``0 < xi <= pi/2``, in pieces from the first one on, G = 1; Undecided if a piece is too short.
 
     Parameters
     ----------
@@ -305,8 +305,8 @@ def pieces(aspect: Fraction, modulus: Fraction) -> tuple[Piece, ...]:
     K = row_of_cells(aspect, modulus)
     first, E = ([c * ball(LONG) ** k for k, c in enumerate(p)] for p in long_waves(aspect, modulus))
     if not proves(expanded(K, Fraction(0), LONG), first, E, Fraction(0), LONG):
-        raise Unproved(f"long waves, up to {float(LONG):g} radians per column")
-    found = [Piece(Fraction(0), LONG, [first[0] + first[1] / ball(LONG)])]
+        raise Undecided(f"long waves, up to {float(LONG):g} radians per column")
+    found = [Stretch(Fraction(0), LONG, [first[0] + first[1] / ball(LONG)])]
     waiting: list[tuple[Fraction, Fraction]] = []
     while not waiting or waiting[-1][1] < END:
         lo = waiting[-1][1] if waiting else LONG
@@ -317,9 +317,9 @@ def pieces(aspect: Fraction, modulus: Fraction) -> tuple[Piece, ...]:
         middle, half = (lo + hi) / 2, (hi - lo) / 2
         X, E = interpolated(K, middle, half)
         if proves(expanded(K, middle, half), X, E, lo, hi):
-            found.append(Piece(lo, hi, X))
+            found.append(Stretch(lo, hi, X))
         elif half < lo * SHORTEST:
-            raise Unproved(f"waves of {float(lo):g} to {float(hi):g} radians per column")
+            raise Undecided(f"waves of {float(lo):g} to {float(hi):g} radians per column")
         else:
             waiting += [(middle, hi), (lo, middle)]
     return tuple(found)
@@ -368,7 +368,7 @@ def enclosed_ratio(
 
     Raises
     ------
-    Unproved
+    Undecided
         The balls do not decide.
 
     Examples
@@ -384,8 +384,8 @@ def enclosed_ratio(
         signs = (1, -1, 1, -1) if mirrored else (1, -1, -1, 1)  # seen from the other side, and from the next column
         seen = lambda c: arb_mat([[c[i, j] * signs[i] * signs[j] for j in range(4)] for i in range(4)])
         both = [pieces(body.aspect, body.modulus) for body in (contact, neumann)]
-        own = [Piece(piece.lo, piece.hi, _scaled(ratio, piece.X)) for piece in both[0]]
-        other = [Piece(piece.lo, piece.hi, [seen(c) for c in piece.X]) for piece in both[1]]
+        own = [Stretch(piece.lo, piece.hi, _scaled(ratio, piece.X)) for piece in both[0]]
+        other = [Stretch(piece.lo, piece.hi, [seen(c) for c in piece.X]) for piece in both[1]]
         at = min(max(Fraction(phase) / 2, LONG), END - SHORTEST)
         least = max(_largest_at(_on(own, x), _on(other, x), normal) for x in (LONG / 2, at))
         most = least * (1 + ball(ABOVE))
@@ -398,12 +398,12 @@ def enclosed_ratio(
             if at_most(most, a.on(lo, hi), b.on(lo, hi), scales, normal):
                 continue
             if not lo or hi - lo < lo * SHORTEST:
-                raise Unproved(f"a bound of {float(most):g} for waves of {float(lo):g} to {float(hi):g}")
+                raise Undecided(f"a bound of {float(most):g} for waves of {float(lo):g} to {float(hi):g}")
             parts += [(lo, (lo + hi) / 2, a, b), ((lo + hi) / 2, hi, a, b)]
         return _double(least, -1), _double(most, 1)
 
 
-def _on(side: Sequence[Piece], x: Fraction) -> Any:
+def _on(side: Sequence[Stretch], x: Fraction) -> Any:
     """X at one wave number."""
     return next(piece.on(x, x)[0] for piece in side if piece.hi >= x)
 

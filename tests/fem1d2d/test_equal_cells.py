@@ -12,17 +12,17 @@ from scipy.linalg import eigh
 from strategies import AT_NIGHT
 
 from fem1d2d import MeshError, mortar, plane_strain, rectangle, stiffness
-from fem1d2d.layers import Interface, Layer, peaks
+from fem1d2d.layers import FacingLayers, Layer, peaks
 from fem1d2d.proofs import layers_proved
-from fem1d2d.proofs.layers_proved import BITS, HalfPlane, Unproved, enclosed_ratio
+from fem1d2d.proofs.layers_proved import BITS, HalfPlane, Undecided, enclosed_ratio
 
 STEEL = plane_strain(2.6, 0.3)  # G = 1
 
 
-def mirrored_layers(contact: float, neumann: float, *, mirrored: bool = True, **interface) -> Interface:
+def mirrored_layers(contact: float, neumann: float, *, mirrored: bool = True, **interface) -> FacingLayers:
     """Cells of two aspects, one material."""
     layers = (Layer(material=STEEL, aspect=contact), Layer(material=STEEL, aspect=neumann, rising=mirrored))
-    return Interface(contact=layers[0], neumann=layers[1], **interface)
+    return FacingLayers(contact=layers[0], neumann=layers[1], **interface)
 
 
 # --- against assembled meshes -----------------------------------------------------------------------------------------
@@ -85,7 +85,7 @@ def test_the_largest_ratio_of_the_waves_is_rho_of_two_assembled_periodic_bodies(
         Layer(material=material, aspect=aspect, rising=rising, rows=rows)
         for material, aspect, rising in zip(materials, aspects, (True, False), strict=True)
     ]
-    rho, rho_normal = (found.max() for found in Interface(contact=layers[0], neumann=layers[1]).ratios(phases))
+    rho, rho_normal = (found.max() for found in FacingLayers(contact=layers[0], neumann=layers[1]).ratios(phases))
     assert rho == pytest.approx(eigh(S_c, S_n, eigvals_only=True)[-1], rel=1e-10)
     condensed = [S[1::2, 1::2] - S[1::2, ::2] @ np.linalg.solve(S[::2, ::2], S[::2, 1::2]) for S in (S_c, S_n)]
     assert rho_normal == pytest.approx(eigh(*condensed, eigvals_only=True)[-1], rel=1e-10)
@@ -158,7 +158,7 @@ def test_cells_of_one_aspect_add_nothing_for_nu_up_to_a_third_and_beyond_only_if
     expected = {0.4: (2.102, 1.599, 1.4, 1.4), 0.45: (2.954, 2.037, 1.278, 1.2), 0.49: (4.844, 2.690, 1.533, 1.157)}
     for aspect, rho in zip((0.5, 1.0, 2.0, 4.0), expected.get(nu, [3 - 4 * nu] * 4), strict=True):
         layer = Layer(material=plane_strain(1.0, nu), aspect=aspect)
-        found = [peak.ratio for peak in peaks(Interface(contact=layer, neumann=layer))]
+        found = [peak.ratio for peak in peaks(FacingLayers(contact=layer, neumann=layer))]
         assert found == pytest.approx([rho, 1.0], abs=1e-3)
 
 
@@ -207,7 +207,7 @@ def drawn(seed: int):
     bodies, doubles = half_planes(pick(["1/4", "1/2", "1", "2", "4"]), pick(["0", "0.3", "0.49"]), shear="3/2")
     mirrored = bool(random.random() < 0.5)
     neumann = Layer(material=doubles[1].material, aspect=doubles[1].aspect, rising=mirrored)
-    return bodies, mirrored, Interface(contact=doubles[0], neumann=neumann)
+    return bodies, mirrored, FacingLayers(contact=doubles[0], neumann=neumann)
 
 
 @pytest.mark.parametrize("seed", range(60) if AT_NIGHT else (0,))
@@ -225,7 +225,7 @@ def test_the_supremum_is_enclosed_to_1e_9_and_no_wave_in_doubles_is_above_it(see
 @pytest.mark.skipif(not AT_NIGHT, reason="in the nightly profile, as it takes eight seconds")
 def test_a_phase_that_is_not_the_best_proves_nothing_false():
     (contact, neumann), _ = half_planes(("1/2", "1"), ("0.3", "0.3"))
-    with pytest.raises(Unproved):
+    with pytest.raises(Undecided):
         enclosed_ratio(contact, neumann, 1.0, mirrored=True, normal=False)
 
 
@@ -259,7 +259,7 @@ def test_a_long_wave_with_a_wrong_field_below_is_refused():
             for p in layers_proved.long_waves(F(1), F(7, 2))
         )
         E[0][0, 0] += layers_proved.arb("1e-9")
-        with pytest.raises(Unproved, match="coefficient 0 of entry 0, 0"):
+        with pytest.raises(Undecided, match="coefficient 0 of entry 0, 0"):
             layers_proved.proves(layers_proved.expanded(K, F(0), long), X, E, F(0), long)
 
 

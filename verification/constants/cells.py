@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 from fem1d2d.element import lacks
-from fem1d2d.layers import Interface, Layer, peaks
+from fem1d2d.layers import FacingLayers, Layer, peaks
 from ndtheory import Number
 from ndtheory.moduli import half_planes
 from verification.interface import assembly
@@ -76,7 +76,7 @@ def rho_of_cells(problem: Problem | None, *, verified: bool = False) -> OfCells:
     return OfCells(numbers={**numbers, **proved.numbers}, unverified=proved.unverified)
 
 
-def halved_cells(problem: Problem) -> Interface:
+def halved_cells(problem: Problem) -> FacingLayers:
     """The layers of a problem whose cells are halved once.
 
     Raises
@@ -122,7 +122,7 @@ def halved_cells(problem: Problem) -> Interface:
     assert neumann.x is not None
     apart = (contact.x[0] - neumann.x[0]) / b
     first = apart.numerator // apart.denominator
-    return Interface(
+    return FacingLayers(
         contact=_layer(contact, size_c, 0),
         neumann=_layer(neumann, size_n, first),
         columns=columns,
@@ -151,14 +151,14 @@ def _roles(problem: Problem) -> tuple[BodySpec, BodySpec]:
 
 
 @lru_cache(maxsize=64)
-def _largest(interface: Interface) -> tuple[float, ...]:
+def _largest(interface: FacingLayers) -> tuple[float, ...]:
     with one_thread():
         return tuple(peak.ratio for peak in peaks(interface))
 
 
 @lru_cache(maxsize=64)
-def _enclosed(interface: Interface, contact: BodySpec, neumann: BodySpec) -> OfCells:
-    from fem1d2d.proofs.layers_proved import HalfPlane, Unproved, enclosed_ratio
+def _enclosed(interface: FacingLayers, contact: BodySpec, neumann: BodySpec) -> OfCells:
+    from fem1d2d.proofs.layers_proved import HalfPlane, Undecided, enclosed_ratio
 
     bodies = []
     for body in (contact, neumann):
@@ -172,6 +172,6 @@ def _enclosed(interface: Interface, contact: BodySpec, neumann: BodySpec) -> OfC
                 normal = name == "rho_normal_cells"
                 lo, hi = enclosed_ratio(bodies[0], bodies[1], peak.phase, mirrored=mirrored, normal=normal)
                 numbers[name] = Number(value=(lo + hi) / 2, lo=lo, hi=hi, level="verified")
-    except (Unproved, ZeroDivisionError) as error:  # cells of extreme shape
+    except (Undecided, ZeroDivisionError) as error:  # cells of extreme shape
         return OfCells(numbers=numbers, unverified=f"undecided in balls: {error}")
     return OfCells(numbers=numbers)

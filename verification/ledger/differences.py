@@ -26,8 +26,8 @@ from verification.contact.active_set import Pattern
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
 from verification.semidefinite.losses import LossForms, square, top
-from verification.semidefinite.neighbours import Factors, squared
-from verification.semidefinite.pattern_search import Form, signs, worst_piece
+from verification.semidefinite.neighbours import Factors, answers, form_of, squared
+from verification.semidefinite.pattern_search import signs, worst_piece
 
 #: Numbers of steps, tried one after the other, in which a force is brought up where the active set cycles: of 19 such
 #: cases on the quick level 11 need 16 steps, 6 need 64 and 2 need 256.
@@ -56,7 +56,7 @@ class DrawnSetting:
 
     @cached_property
     def forms(self) -> LossForms:
-        """Gram matrices and the forms on the pieces of T."""
+        """Gram matrices of Section 5."""
         return LossForms(self.pair)
 
     @cached_property
@@ -313,12 +313,6 @@ def random_pairs(setting: DrawnSetting, random: np.random.Generator, count: int)
         yield between(setting, psi, other)
 
 
-def work_form(forms: LossForms, piece: Piece) -> Floats:
-    """The work ``<T psi - T psi~, w^2 - w~^2>`` as a quadratic form in y."""
-    form = forms.d_2.T @ forms.force(piece)
-    return np.asarray(form + form.T) / 2
-
-
 def uniform_piece(pair: ContactPair, *, touching: bool, sliding: int) -> Piece:
     """The piece on which all nodes have one state."""
     t = pair.contact.grid.t
@@ -333,28 +327,25 @@ def pieces(setting: DrawnSetting, random: np.random.Generator, *, starts: int) -
     All nodes stick; all are open and slide one way; the worst pieces of searches for the largest friction term, the
     largest ``|||T psi - T psi~|||`` and the largest work, from ``starts`` patterns each, 0 for no search.
     """
-    pair, forms = setting.pair, setting.forms
+    pair, inverse = setting.pair, setting.forms.inverse
     friction = bool(pair.friction)
     found = [uniform_piece(pair, touching=True, sliding=0 if friction else 1)]
     found.append(uniform_piece(pair, touching=False, sliding=1))
-    objectives: list[tuple[Form, Factors]] = [
-        (lambda piece: square(forms.force(piece), forms.inverse), lambda found: squared(found.force, forms.inverse)),
-        (lambda piece: work_form(forms, piece), lambda found: (found.force @ forms.inverse, found.g)),
+    objectives: list[Factors] = [
+        lambda found: squared(found.force, inverse),
+        lambda found: (found.force @ inverse, found.g),
+        *([lambda found: found.friction] if friction else []),
     ]
-    if friction:
-        objectives.append((forms.friction, lambda found: found.friction))
     if starts:
-        found += [
-            worst_piece(pair, form, factors=factors, random=random, starts=starts).piece for form, factors in objectives
-        ]
+        found += [worst_piece(pair, factors, random=random, starts=starts).piece for factors in objectives]
     return found
 
 
 def directions(setting: DrawnSetting, piece: Piece, random: np.random.Generator) -> list[Floats]:
     """Directions on a piece: the worst ones of the pencils of Section 5, and random ones."""
-    forms = setting.forms
-    T, work, F = forms.force(piece), work_form(forms, piece), forms.friction(piece)
-    size_1, size_2 = square(forms.d_1(piece), forms.N_1), square(forms.d_2, forms.N_2)
+    forms, found = setting.forms, answers(piece)
+    T, work, F = found.force.T, form_of((found.force @ forms.inverse, found.g)), form_of(found.friction)
+    size_1, size_2 = square(found.d_1.T, forms.N_1), square(forms.d_2, forms.N_2)
     dual, one = square(forms.root, forms.dual), np.eye(len(F))
     square_T = square(T, forms.inverse)
     pencils = [

@@ -22,6 +22,7 @@ from verification.ledger.evidence import Evidence, Level, Watch, figure, source
 from verification.ledger.inequalities import SEED, Reading
 from verification.ledger.worst import Trial, draw_cases
 from verification.semidefinite.losses import square
+from verification.semidefinite.neighbours import answers
 
 #: Random problems, beside the named ones.
 COUNT: dict[str, int] = {"quick": 6, "full": 60}
@@ -95,7 +96,7 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     steep = reading.C_K * reading.M**2 / reading.m**3  # of the printed bound in k, where the bracket is 1
     first = DrawnSetting(pair=_with_friction(case.pair, Fraction(1)))
     piece = uniform_piece(first.pair, touching=False, sliding=1)
-    T, felt = first.forms.force(piece), case.pair.neumann.grid
+    T, felt = answers(piece).force.T, case.pair.neumann.grid
     y = eigh(square(T, first.forms.inverse))[1][:, -1]
     unit_step = along(first, piece, y)  # |y| = 1: e = 1; F = alpha k^2 + gamma k, W = gamma k, t^2 = beta k^2
     gamma, beta = unit_step.work, unit_step.norm_T**2

@@ -140,16 +140,28 @@ class Conditions:
             total += a.T @ (values[:, None] * b)
         return (total + total.T) / 2
 
+    def inner(self, one: Floats, other: Floats) -> Floats:
+        """The inner product of two linear forms in the norm of the factor: (5.21), Euclidean in these coordinates.
+
+        Programs have that norm from here, their check from S_2.
+        """
+        return np.asarray(one.T @ other)
+
     @property
     def free(self) -> Floats:
         """The form ``|g|^2``."""
-        return np.asarray(self.g.T @ self.g)
+        return self.inner(self.g, self.g)
 
     @property
     def cross(self) -> Floats:
         """The form ``<g, p>``."""
-        cross = self.g.T @ self.p
+        cross = self.inner(self.g, self.p)
         return np.asarray(cross + cross.T) / 2
+
+    def fixed(self, theta: float) -> Floats:
+        """The form ``-|theta p + (1 - theta) g|^2``: what is left of a difference of forces after one step."""
+        step = theta * self.p + (1 - theta) * self.g
+        return self.inner(-step, step)
 
     def square_from_below(self, found: Optimum) -> np.polynomial.Polynomial:
         """A parabola in theta below the square of the factor that a program at any theta can prove, from one program.
@@ -157,10 +169,9 @@ class Conditions:
         Its moments satisfy the dual constraints, which do not depend on theta.  At its own theta the parabola has the
         value that the solver found, up to its accuracy.
         """
-        move = self.p - self.g
-        inner = lambda a, b: float(np.vdot(a @ found.moments, b))
-        coefficients = [inner(self.g, self.g), 2 * inner(self.g, move), inner(move, move)]
-        return np.polynomial.Polynomial(coefficients) / float(np.vdot(found.moments, self.free))
+        move, of = self.p - self.g, lambda form: float(np.vdot(found.moments, form))
+        square = of(self.free)
+        return np.polynomial.Polynomial([square, 2 * of(self.inner(self.g, move)), of(self.inner(move, move))]) / square
 
     def rows(self, multipliers: Weights, pieces: Pieces) -> tuple[Floats, Floats, Cones, Floats, Floats]:
         """Left and right rows of the products, positions of multipliers in cones, the multipliers, and their limits.

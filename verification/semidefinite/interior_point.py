@@ -137,7 +137,7 @@ class Optimum:
     early: tuple[float, Floats] | None = None
 
 
-class Form:
+class MatrixBlock:
     """A block of the matrix of the program: ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2``.
 
     The rows are scaled to length one, and the multipliers with them.
@@ -268,8 +268,8 @@ def solve(program: Program) -> Optimum:
     else:
         size = lengths[0] * lengths[1]
     rows = [r / n[:, None] for r, n in zip((program.left, program.right), lengths, strict=True)]
-    forms = [Form(program, block, *rows) for block in program.blocks]
-    blocks: list[Form | Cones] = [*forms, *_cones(program, size)]
+    forms = [MatrixBlock(program, block, *rows) for block in program.blocks]
+    blocks: list[MatrixBlock | Cones] = [*forms, *_cones(program, size)]
     cost = np.zeros(1 + len(size))
     cost[0] = -1.0 if maximise else 1.0
     order = sum(block.rows for block in blocks)
@@ -330,7 +330,7 @@ def solve(program: Program) -> Optimum:
 class _Newton:
     """The equations of one step: the dual constraints, ``Z = fixed + linear(y)`` and ``X Z = centre``, linearised."""
 
-    blocks: list[Form | Cones]
+    blocks: list[MatrixBlock | Cones]
     cost: Floats
     X: list[Floats]
     inverse: list[Floats]
@@ -349,7 +349,7 @@ class _Newton:
         return dy, dZ, turned, dX if wanted is None else _moved(wanted, 1.0, dX)
 
 
-def _adjoint(blocks: list[Form | Cones], matrices: list[Floats], size: int) -> Floats:
+def _adjoint(blocks: list[MatrixBlock | Cones], matrices: list[Floats], size: int) -> Floats:
     total = np.zeros(size)
     for block, matrix in zip(blocks, matrices, strict=True):
         block.adjoint(matrix, total)
@@ -415,7 +415,7 @@ def _moved(matrices: list[Floats], along: float, steps: list[Floats]) -> list[Fl
     return [m + along * d for m, d in zip(matrices, steps, strict=True)]
 
 
-def _longest(blocks: list[Form | Cones], roots: list[Floats], steps: list[Floats]) -> float:
+def _longest(blocks: list[MatrixBlock | Cones], roots: list[Floats], steps: list[Floats]) -> float:
     """Largest step, at most, along which matrices with these roots stay positive semidefinite."""
     low = min(block.least(root, step) for block, root, step in zip(blocks, roots, steps, strict=True))
     return -1 / low if low < 0 else math.inf

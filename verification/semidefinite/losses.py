@@ -19,7 +19,6 @@ from scipy.linalg import eigvalsh
 from fem1d2d.mesh import Floats
 from ndtheory import PRINTED, REPAIRED
 from ndtheory import bounds as formulas
-from verification.algorithm.affine_piece import Piece
 from verification.bounds.losses import Loss, Losses
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
@@ -28,7 +27,7 @@ from verification.machine.threads import one_thread
 from verification.registry import PROOFS, Prover
 from verification.semidefinite import LARGEST
 from verification.semidefinite.neighbours import Factors, squared
-from verification.semidefinite.pattern_search import Form, worst_piece
+from verification.semidefinite.pattern_search import worst_piece
 
 #: Number of searches of patterns for the losses of one problem, and of starts of each.
 SEARCHES, STARTS = 6, 2
@@ -95,7 +94,7 @@ def quotients(
 
 
 class LossForms:
-    """The quadratic forms of Section 5 in y with ``psi - psi~ = L_2 y``, so that the length of y is the norm (5.21).
+    """The Gram matrices of Section 5; in y with ``psi - psi~ = L_2 y`` the length of y is the norm (5.21).
 
     "1" is the contact body and "2" the Neumann body, whatever their numbers in the file; no contact node is held.
     """
@@ -103,26 +102,10 @@ class LossForms:
     def __init__(self, pair: ContactPair) -> None:
         self.pair = pair
         self.root, self.inverse = pair.neumann.root, pair.neumann.inverse
-        self.carried = pair.interface.carry(self.inverse)
         self.N_1, self.E_1 = pair.contact.lift_gram, pair.contact.gram
         self.N_2, self.E_2 = pair.neumann.lift_gram, pair.neumann.gram
         self.dual: Floats = np.asarray(np.linalg.inv(self.E_2))  # of the norm of V^2'
         self.d_2 = self.inverse @ self.root
-
-    def force(self, piece: Piece) -> Floats:
-        """``T psi - T psi~``."""
-        return piece.force @ self.root
-
-    def d_1(self, piece: Piece) -> Floats:
-        """The trace of ``w^1 - w~^1``."""
-        return (self.carried + piece.jump) @ self.root
-
-    def friction(self, piece: Piece) -> Floats:
-        """The friction term of (5.12): nodes that slide."""
-        t = self.pair.contact.grid.t
-        jump = piece.pattern.sliding[:, None] * (piece.jump[:t] @ self.root)
-        form = -(piece.bound @ self.root).T @ jump
-        return np.asarray(form + form.T) / 2
 
 
 def suprema(forms: LossForms) -> Suprema:
@@ -151,10 +134,10 @@ def square(rows: Floats, gram: Floats) -> Floats:
     return np.asarray(form + form.T) / 2
 
 
-def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Progress = silent) -> Losses | None:
+def locate(pair: ContactPair, measured: Measured, *, progress: Progress = silent) -> Losses | None:
     """Find the loss of each inequality at the problem's friction; None if a constant does not exist or a node is held.
 
-    ``seed`` is for the search, ``progress`` is called with the share of the searches that are done.
+    ``progress`` is called with the share of the searches that are done.
     """
     constants = measured.constants()
     if constants is None or pair.held:
@@ -167,24 +150,22 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
         N_1, N_2, dual, d_2 = forms.N_1, forms.N_2, forms.dual, forms.d_2
         size2, norm = square(d_2, N_2), square(forms.root, dual)
 
-        def found(form: Form, factors: Factors, against: Floats | None = None) -> float:
+        def found(factors: Factors, against: Floats | None = None) -> float:
             """The largest value of a quadratic form against another one, the norm (5.21) by default."""
             progress("searching what the inequalities lose", next(done) / SEARCHES)
-            random = np.random.default_rng(seed)
-            return worst_piece(pair, form, factors=factors, against=against, random=random, starts=STARTS).value
+            random = np.random.default_rng(0)
+            return worst_piece(pair, factors, against=against, random=random, starts=STARTS).value
 
         def force(gram: Floats, against: Floats | None = None) -> float:
             """``|T psi - T psi~|`` in a norm, squared."""
-            return found(
-                lambda piece: square(forms.force(piece), gram), lambda some: squared(some.force, gram), against
-            )
+            return found(lambda some: squared(some.force, gram), against)
 
         def trace(against: Floats | None = None) -> float:
             """``|w^1 - w~^1|_1``, squared."""
-            return found(lambda piece: square(forms.d_1(piece), N_1), lambda some: squared(some.d_1, N_1), against)
+            return found(lambda some: squared(some.d_1, N_1), against)
 
         # suprema against e = |||psi - psi~|||, squared
-        F = found(forms.friction, lambda some: some.friction)
+        F = found(lambda some: some.friction)
         t, t_dual, d1 = force(forms.inverse), force(dual), trace()
         # and against other norms
         ratio, T_dual = trace(size2), force(dual, norm)

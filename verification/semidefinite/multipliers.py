@@ -147,8 +147,7 @@ class QuadraticForms(Conditions):
         ------
         LMIError
         """
-        step = theta * self.p + (1 - theta) * self.g
-        fixed, start = -step.T @ step, None
+        fixed, start = self.fixed(theta), None
         if parent is not None and parent[1].early is not None:
             start = self.started(fixed, parent[1].early, parent[0], pieces)
         holds = lambda weights: self.traces.with_multipliers(weights, step=(theta, 1 - theta))
@@ -158,8 +157,7 @@ class QuadraticForms(Conditions):
     @one_thread()
     def proved_by(self, multipliers: Weights, theta: float) -> Certified | None:
         """The least Lipschitz constant of T_theta on some pieces that given multipliers prove; None if they do not."""
-        step = theta * self.p + (1 - theta) * self.g
-        evaluated = self._least_value(-step.T @ step - self.conditions(multipliers))
+        evaluated = self._least_value(self.fixed(theta) - self.conditions(multipliers))
         if evaluated is None:
             return None
         holds = self.traces.with_multipliers(multipliers, step=(theta, 1 - theta))
@@ -211,7 +209,7 @@ class QuadraticForms(Conditions):
         LMIError
         """
         move = self.p - self.g
-        still, moving = 2 * (self.free - self.cross), move.T @ move
+        still, moving = 2 * (self.free - self.cross), self.inner(move, move)
         proposals: list[tuple[float, Weights]] = []
         early = None
         try:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
+from verification.algorithm.affine_piece import Piece
 from verification.contact.active_set import Pattern
 from verification.dense import pinned, vanishing
 from verification.interface.body import Condensed
@@ -73,11 +74,23 @@ def values(factors: tuple[Floats, Floats]) -> Floats:
     return np.asarray(np.einsum("ij,ij->i", *factors))
 
 
-def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np.int8]) -> Responses:
-    """Answers of T to a change of force g, shape (2 n,), on several pieces; ``sign`` is the one of S sigma_N.
+def form_of(factors: tuple[Floats, Floats]) -> Floats:
+    """The matrix of a form from its factors for a basis of forces."""
+    form = factors[0] @ factors[1].T
+    return np.asarray(form + form.T) / 2
 
-    :class:`verification.algorithm.affine_piece.Piece` has the same by all forces.
-    """
+
+def answers(piece: Piece) -> Responses:
+    """Answers of T on one piece to the forces ``g = L y``, a row for each component of y; ``|y|`` is their norm."""
+    pair = piece.pair
+    root = pair.neumann.root
+    jump = piece.jump @ root
+    carried = pair.interface.carry(pair.neumann.flexibility(root))
+    return Responses(pair=pair, g=root.T, d_1=(carried + jump).T, jump=jump.T, reaction=(piece.reaction @ root).T)
+
+
+def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np.int8]) -> Responses:
+    """Answers of T to a change of force g, shape (2 n,), on several pieces; ``sign`` is the one of S sigma_N."""
     contact, t = pair.contact, pair.contact.grid.t
     carried = pair.interface.carry(pair.neumann.flexibility(g))
     rubbing = np.zeros((len(patterns.sliding), len(carried)))

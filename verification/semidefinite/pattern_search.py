@@ -11,7 +11,7 @@ nodes slide the other way.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -25,15 +25,23 @@ from verification.algorithm.affine_piece import Piece
 from verification.contact.active_set import Pattern
 from verification.interface.pair import ContactPair
 from verification.machine.threads import one_thread
-from verification.semidefinite.neighbours import Factors, Neighbours, Patterns, Responses, responses, squared, values
+from verification.semidefinite.neighbours import (
+    Factors,
+    Neighbours,
+    Patterns,
+    Responses,
+    answers,
+    form_of,
+    responses,
+    squared,
+    values,
+)
 
 #: A sum of forces that cancels up to this share of their sizes may be 0.
 CANCELLED = 1e-6
 
 #: Digits in which values differ: the way uphill is the same however a processor rounds.
 DIGITS = 9
-
-Form = Callable[[Piece], Floats]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,19 +79,14 @@ class Search:
 
     Parameters
     ----------
-    form : callable
-        Piece -> symmetric matrix, in y with ``g = L y`` (:attr:`verification.interface.body.Condensed.root`).
+    factors : callable
+        Of the form (:data:`verification.semidefinite.neighbours.Factors`).
     against : array, optional
-        The form whose value is 1: the identity, the norm (5.21), by default.
-    factors : callable, optional
-        Of the same form (:data:`verification.semidefinite.neighbours.Factors`).  With it all pieces next to the best
-        are looked at together, and few of them one by one.
+        The form whose value is 1, in y with ``g = L y``: the identity, the norm (5.21), by default.
     """
 
-    def __init__(
-        self, pair: ContactPair, form: Form, *, against: Floats | None = None, factors: Factors | None = None
-    ) -> None:
-        self.pair, self._form, self._against, self._factors = pair, form, against, factors
+    def __init__(self, pair: ContactPair, factors: Factors, *, against: Floats | None = None) -> None:
+        self.pair, self._factors, self._against = pair, factors, against
         tangential = (0, 1, -1) if pair.rubs else (1,)  # without friction every node slides
         self.states = [(touching, slide) for touching in (True, False) for slide in tangential]
         self.sign, self._still = signs(pair), np.zeros(pair.neumann.grid.n, dtype=bool)
@@ -117,7 +120,7 @@ class Search:
             if level >= self._below.get(visited, np.inf):
                 return None
             piece = Piece(pair=self.pair, pattern=pattern, sign=self.sign, still=self._still)
-            form = self._form(piece)
+            form = form_of(self._factors(answers(piece)))
             if level > -np.inf:
                 against = np.eye(len(form)) if self._against is None else self._against
                 if dpotrf(level * against - form)[1] == 0:
@@ -134,7 +137,7 @@ class Search:
         """The best piece on the way up: what one node does is changed, or several do, as long as that helps.
 
         Where no node helps any more, ``side_by_side`` changes two neighbours together, as where a border between nodes
-        that slide to either side moves; it needs ``factors``.
+        that slide to either side moves.
         """
         better: FoundFactor | None = best
         while better is not None:
@@ -150,9 +153,6 @@ class Search:
     def _tried(self, best: FoundFactor, level: float) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
         """Patterns that may be better, the most promising first: by the change of force that is worst on the best."""
         patterns, node = self._neighbours(best.piece.pattern)
-        if self._factors is None:
-            yield from zip(patterns.touching, patterns.sliding, strict=True)
-            return
         beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
         forces, size = self.pair.neumann.root @ best.eigenvectors, best.size or 1.0
         promised = np.round(beside.values(forces[:, -1]) / size, DIGITS)
@@ -173,7 +173,6 @@ class Search:
         self, best: FoundFactor, level: float
     ) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
         """Patterns that differ at two nodes side by side and are better up to rounding, the most promising first."""
-        assert self._factors is not None
         patterns, node = _side_by_side(best.piece.pattern, *self._neighbours(best.piece.pattern))
         if not len(node):  # a single contact node
             return
@@ -201,19 +200,13 @@ class Search:
 
 
 def worst_piece(
-    pair: ContactPair,
-    form: Form,
-    *,
-    random: np.random.Generator,
-    against: Floats | None = None,
-    factors: Factors | None = None,
-    starts: int = 4,
+    pair: ContactPair, factors: Factors, *, random: np.random.Generator, against: Floats | None = None, starts: int = 4
 ) -> FoundFactor:
     """Search the affine pieces of T for the largest value of a quadratic form; parameters as in :class:`Search`.
 
     The starts are: all nodes stick that can, all are open and slide one way, and random patterns.
     """
-    return _from_starts(Search(pair, form, against=against, factors=factors), random=random, starts=starts)
+    return _from_starts(Search(pair, factors, against=against), random=random, starts=starts)
 
 
 def _from_starts(search: Search, *, random: np.random.Generator, starts: int) -> FoundFactor:
@@ -230,14 +223,10 @@ def _from_starts(search: Search, *, random: np.random.Generator, starts: int) ->
 def factor_search(pair: ContactPair, theta: float) -> Search:
     """The search for the largest ``|J|^2`` of T_theta in the norm (5.21)."""
 
-    def form(piece: Piece) -> Floats:
-        J = piece.relaxed(theta)
-        return J.T @ J
-
     def factors(found: Responses) -> tuple[Floats, Floats]:
         return squared(theta * found.force + (1 - theta) * found.g, pair.neumann.inverse)
 
-    return Search(pair, form, factors=factors)
+    return Search(pair, factors)
 
 
 def largest_factor(pair: ContactPair, theta: float, *, random: np.random.Generator, starts: int = 4) -> FoundFactor:

@@ -10,7 +10,7 @@ import numpy as np
 
 from builder.scenes import axis, chart, dots, line, scene, slider, widget
 from fem1d2d import plane_strain
-from fem1d2d.layers import Interface, Layer, peaks
+from fem1d2d.layers import FacingLayers, Layer, peaks
 from ndtheory.energy_norms import predicted_theta
 from ndtheory.moduli import Moduli, half_planes
 
@@ -32,11 +32,11 @@ WAVES = np.linspace(0.02, np.pi / 2, 40)
 RHO, THETA = (0.0, 7.0), (0.2, 0.6)
 
 
-def interface(contact: Fraction, neumann: Fraction) -> Interface:
+def interface(contact: Fraction, neumann: Fraction) -> FacingLayers:
     """Half-planes of cells of two heights, diagonals mirrored."""
     material = plane_strain(1.0, float(NU))
     layers = (Layer(material=material, aspect=float(1 / height)) for height in (contact, neumann))
-    return Interface(**dict(zip(("contact", "neumann"), layers, strict=True)))
+    return FacingLayers(**dict(zip(("contact", "neumann"), layers, strict=True)))
 
 
 def long_waves() -> float:

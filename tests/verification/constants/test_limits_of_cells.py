@@ -16,7 +16,7 @@ from test_rho_of_cells import Family, normal
 
 import verification as vf
 from fem1d2d import plane_strain, rectangle, stiffness
-from fem1d2d.layers import Interface, Layer, peaks
+from fem1d2d.layers import FacingLayers, Layer, peaks
 from ndtheory.moduli import Moduli, half_planes
 
 F = Fraction
@@ -179,7 +179,7 @@ class Held:
         S_c, S_n = pair.contact.schur, pair.neumann.schur
         return np.array([top(S_c, S_n), top(condensed(S_c), normal(S_n))])
 
-    def layers(self, *, endless: bool) -> Interface:
+    def layers(self, *, endless: bool) -> FacingLayers:
         """Both bodies continued without ends; rectangle() lets cell (i, j) rise where i + j is even."""
         below = lambda column, rows: (column + rows - 1) % 2 == 0
         above = lambda column: column % 2 == 1  # seen from the other side
@@ -195,7 +195,7 @@ class Held:
             )
             for nu, aspect, up, rows in zip(self.poisson, self.aspects, rising, self.rows, strict=True)
         )
-        return Interface(contact=contact, neumann=neumann)
+        return FacingLayers(contact=contact, neumann=neumann)
 
     def bound(self) -> np.ndarray:
         """What the page proves of rho and rho_N."""

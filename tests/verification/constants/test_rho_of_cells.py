@@ -13,7 +13,7 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from fem1d2d import plane_strain
-from fem1d2d.layers import Interface, Layer, peaks
+from fem1d2d.layers import FacingLayers, Layer, peaks
 from fem1d2d.proofs.layers_proved import HalfPlane, enclosed_ratio
 from verification.constants.cells import halved_cells, rho_of_cells
 
@@ -74,7 +74,7 @@ class Family(NamedTuple):
         return np.array([top(S_c, S_n), top(normal(S_c), normal(S_n))])
 
     @property
-    def interface(self) -> Interface:
+    def interface(self) -> FacingLayers:
         """Half-planes of the cells."""
         layers = [
             Layer(material=plane_strain(float(F(young)), float(nu)), aspect=float(aspect), rising=rising)
@@ -82,7 +82,7 @@ class Family(NamedTuple):
                 (self.young, "1"), self.poisson, self.aspects, (True, self.mirrored), strict=True
             )
         ]
-        return Interface(contact=layers[0], neumann=layers[1])
+        return FacingLayers(contact=layers[0], neumann=layers[1])
 
     @property
     def predicted(self) -> np.ndarray:
