@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
-from ndtheory.bounds import FACTOR
+from ndtheory.bounds import FACTOR, Edition
 from ndtheory.keys import Key, Part, document, key, plain, says
 from ndtheory.number import Level, Numeric, above, below
 from verification.machine.progress import Progress, silent
@@ -249,6 +249,8 @@ class Bound(ABC):
         Its name in documents and tables; a description for a reader.
     colour, dashes, fill, hatch : str or tuple
         Colour and style of its line in figures, on white; colour (``colour`` by default) and pattern of its region.
+    edition : Edition or None
+        The edition of Proposition 5.6 that it is; None for another bound.
     finding : bool
         True if a step beyond it is a finding about the paper's text, not a fault: only for the printed theorem.
     calculated : bool
@@ -272,6 +274,7 @@ class Bound(ABC):
     dashes: ClassVar[str | tuple[int, tuple[int, ...]]] = "-."
     fill: ClassVar[str] = ""
     hatch: ClassVar[str] = ""
+    edition: ClassVar[Edition | None] = None
     finding: ClassVar[bool] = False
     calculated: ClassVar[bool] = True
     attained: ClassVar[bool] = False

@@ -43,7 +43,7 @@ NO_SUM = "needed M >= 2 m, as M is the sum of the constants of both bodies (4.2)
 class Section5(Bound):
     """An edition of Proposition 5.6."""
 
-    edition: Edition
+    edition: ClassVar[Edition]
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if subject.constants is None:

@@ -10,7 +10,7 @@ import click
 from ndtheory import EDITIONS, Constants, EnergyConstants, HypothesisError
 from ndtheory.constants import take
 from verification.bounds.bound import NOT_ASKED, Subject
-from verification.bounds.table import ENERGY, SECTION_5, Calculated, Energy, Section5
+from verification.bounds.table import ENERGY, SECTION_5, Calculated
 from verification.cli.console import deliver
 from verification.cli.forms import cli
 from verification.cli.options import JSON, OneOf, one_file
@@ -85,18 +85,17 @@ def bounds(
         else constants.C_K
     )
     energy = _energy(of_norms, friction > 0)
-    subject = Subject(constants=constants, energy=energy)
+    subject = Subject(
+        constants=constants,
+        energy=energy,
+        why="needs --m, --M, --CR and --CK",
+        why_energy="needs --rho, and --kappa1, --kappa2 with friction",
+    )
     results = {}
     for name, bound in BOUNDS.items():
-        if not bound.calculated:
-            continue
-        of_paper = isinstance(bound, Section5)
-        if of_paper and (alone or edition not in (name, "both")):
-            results[name] = bound.absent("needs --m, --M, --CR and --CK" if alone else NOT_ASKED)
-        elif isinstance(bound, Energy) and energy is None:
-            results[name] = bound.absent("needs --rho, and --kappa1, --kappa2 with friction")
-        else:
-            results[name] = bound.evaluate(subject, theta)
+        if bound.calculated:
+            left_out = bound.edition is not None and constants is not None and edition not in (name, "both")
+            results[name] = bound.absent(NOT_ASKED) if left_out else bound.evaluate(subject, theta)
     found = Calculated(constants=constants, energy=energy, theta=theta, results=results)
     deliver(found, sections, as_json, writing(target, _draw), target)
     proved = any(result.factor is not None and result.proved for result in results.values())

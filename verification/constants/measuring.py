@@ -99,21 +99,18 @@ def _with_matrices(pair: ContactPair) -> Measured:
     friction = float(pair.friction)
     values: dict[str, float | None] = dict.fromkeys(ALL_NAMES)
     reason: dict[str, str] = {}
-    body1 = body2 = None
-    meshes = pair.contact.body is not None
-    if not meshes:
-        reason = dict.fromkeys(OF_MESHES, FROM_MATRICES)
-    else:
-        body1, body2 = constants_of(pair.body1.mesh_body), constants_of(pair.body2.mesh_body)
-        values |= {"m": min(body1.m.value, body2.m.value), "M": body1.M.value + body2.M.value}
+    sides = (pair.body1, pair.body2)
+    bodies = [constants_of(side.body) for side in sides if side.body is not None]
     free, grid = pair.contact.free, pair.contact.grid
     tangential = (np.arange(grid.size) < grid.t)[free]
     values |= of_energy(pair, tangential)
-    if meshes:
+    if bodies:
         values |= of_section_5(pair, tangential)
+    else:
+        reason = dict.fromkeys(OF_MESHES, FROM_MATRICES)
     if pair.interface.kernel is None:
         reason = dict.fromkeys(("C_s", "C_s_energy"), "no friction and no radius: S is not defined") | reason
-        values |= {"kappa_1": 0.0, "kappa_2": 0.0} | ({"C_K": 0.0} if meshes else {})
+        values |= {"kappa_1": 0.0, "kappa_2": 0.0} | ({"C_K": 0.0} if bodies else {})
     if pair.contact.slides:
         reason["C_t1"] = SLIDES
         if friction:
@@ -124,31 +121,14 @@ def _with_matrices(pair: ContactPair) -> Measured:
         a, b = values[first], values[second]
         if a is not None and b is not None:
             values[name] = friction * a * b
-    numbers = _numbers(values)
-    if body1 is not None and body2 is not None:
-        numbers["m"] = min(body1.m, body2.m, key=lambda m: m.value)  # 0 is exact
-    return Measured(
-        body1=body1,
-        body2=body2,
-        friction=friction,
-        interface_nodes=pair.contact.grid.n,
-        reason=reason,
-        units=pair.units,
-        problem=pair.problem,
-        **numbers,
-    )
-
-
-def _numbers(values: dict[str, float | None]) -> dict[str, Any]:
-    return {name: None if value is None else Number.of_float(value) for name, value in values.items()}
+    return _gathered(pair, bodies, values, reason)
 
 
 def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
     """The constants that need no interface matrices."""
     pencils, problem = Pencils(bodies, progress), bodies.problem
     values: dict[str, float | None] = dict.fromkeys(ALL_NAMES)
-    lower, upper = (constants_of(body, dense=False) for body in bodies.elastic)
-    values |= {"m": min(lower.m.value, upper.m.value), "M": lower.M.value + upper.M.value}
+    each = [constants_of(body, dense=False) for body in bodies.elastic]
     if not pencils.reason:
         neumann = problem.iteration.neumann_body
         values["rho_max"] = pencils.largest(neumann_body=neumann).value
@@ -156,16 +136,27 @@ def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
         values["rho_normal"] = pencils.largest(neumann_body=neumann, normal=True).value
     if not bodies.friction:
         values |= dict.fromkeys(("C_K", "kappa_1", "kappa_2"), 0.0)
-    numbers = _numbers(values)
-    missing = [name for name, value in numbers.items() if value is None]
+    missing = [name for name, value in values.items() if value is None and name not in ("m", "M")]
+    return _gathered(bodies, each, values, dict.fromkeys(missing, needs_matrices(bodies)) | pencils.reason)
+
+
+def _gathered(
+    of: ContactPair | TwoBodies, bodies: list[BodyConstants], values: dict[str, float | None], reason: dict[str, str]
+) -> Measured:
+    """The constants of bodies, none where they are known by matrices only, and those that they have together."""
+    numbers: dict[str, Any] = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
+    if bodies:
+        numbers["m"] = min((body.m for body in bodies), key=lambda m: m.value)  # 0 is exact
+        numbers["M"] = Number.of_float(sum(body.M.value for body in bodies))
+    body1, body2 = bodies or (None, None)
     return Measured(
-        body1=lower,
-        body2=upper,
-        friction=float(bodies.friction),
-        interface_nodes=bodies.interface.contact.n,
-        reason=dict.fromkeys(missing, needs_matrices(bodies)) | pencils.reason,
-        units=problem.units,
-        problem=problem,
+        body1=body1,
+        body2=body2,
+        friction=float(of.friction),
+        interface_nodes=of.interface.contact.n,
+        reason=reason,
+        units=of.problem.units if isinstance(of, TwoBodies) else of.units,
+        problem=of.problem,
         **numbers,
     )
 

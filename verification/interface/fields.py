@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Floats, Ints
 from ndtheory.keys import ABSENT, Key, Part, document, key, says
 from verification.contact.active_set import Pattern
 from verification.interface.interface import Interface, Stretch
@@ -125,13 +125,23 @@ class ContactFields(Value, Part):
                 order[line.contact], turned[line.contact] = order[line.contact][::-1], True
         if not turned.any():
             return self
-        arrays = {name: value[order] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        taken, s = self.at(order), self.s[order]
         for line in self.lines:  # s from the other end
             if line.flipped:
-                arrays["s"][line.contact] = self.s[line.contact][-1] - arrays["s"][line.contact]
-        arrays["normal"] = np.where(turned[:, None], -arrays["normal"], arrays["normal"]) + 0.0
+                s[line.contact] = self.s[line.contact][-1] - s[line.contact]
+        normal = np.where(turned[:, None], -1.0, 1.0) * taken.normal + 0.0
         lines = tuple(replace(line, flipped=False) for line in self.lines)
-        return copied(self, **arrays, status=tuple(self.status[i] for i in order), lines=lines)
+        return copied(self, **taken.arrays | {"s": s, "normal": normal}, status=taken.status, lines=lines)
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """The arrays by the names of their fields."""
+        return {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+
+    def at(self, nodes: Ints) -> ContactFields:
+        """Return the fields at some nodes."""
+        arrays = {name: value[nodes] for name, value in self.arrays.items()}
+        return replace(self, **arrays, status=tuple(self.status[i] for i in nodes))
 
     def unrolled(self) -> ContactFields:
         """Return the fields with s in place of x; several lines follow each other, with NaN between them."""
@@ -144,17 +154,11 @@ class ContactFields(Value, Part):
             x.append(np.append(s + shift, np.nan))
             order.append(np.append(np.arange(len(own.x))[line.contact], line.contact.stop - 1))
             shift += 1.05 * float(s[-1])  # a gap that is seen
-        nodes, positions = np.concatenate(order), np.concatenate(x)
-        arrays = {name: value[nodes] for name, value in vars(own).items() if isinstance(value, np.ndarray)}
-        status = tuple(own.status[i] for i in nodes)
-        return replace(own, **{**arrays, "x": positions}, status=status, lines=())
+        return replace(own.at(np.concatenate(order)), x=np.concatenate(x), lines=())
 
     def between(self, low: float, high: float) -> ContactFields:
         """Return the part of Gamma_c from one position to another."""
-        kept = np.flatnonzero((self.x >= low) & (self.x <= high))
-        status = tuple(self.status[i] for i in kept)
-        arrays = {name: value[kept] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return replace(self, **arrays, status=status, lines=())
+        return replace(self.at(np.flatnonzero((self.x >= low) & (self.x <= high))), lines=())
 
     @property
     @says(inside=dict.fromkeys(STATES, Key(says="number of nodes in each state", type="integer")))

@@ -227,8 +227,6 @@ def _surfaces(problem: Problem, meshes: list[Mesh | None], ends: Ends | None) ->
         try:
             if mesh is None:
                 nodes.append(np.empty(0, dtype=np.int64))
-            elif mesh.dimension == 1:
-                nodes.append(surface(mesh, upper=upper))
             elif ends is not None and problem.contact.interval is not None:  # only then may it be curved
                 nodes.append(facing(mesh, upper=upper, ends=ends))
             else:

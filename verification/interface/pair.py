@@ -215,8 +215,7 @@ class ContactPair(Value):
             if self.problem is not None:
                 raise SingularRole.of(self.problem, self.contact.mesh_body, self.neumann.mesh_body)
             raise SingularRole(self.source, self.contact_body, self.contact.motions.shape[1])
-        named = self.problem is not None and self.problem.contact.named
-        if (named or not self.interface.one_grid) and self.problem is not None:
+        if self.problem is not None and (self.problem.contact.named or not self.interface.one_grid):
             return pair_from(self.problem.swapped(), law=self.interface.law, like=self)
         if self.problem is not None and self.contact.grid.dimension == 2:
             bodies = [side.mesh_body for side in (self.body1, self.body2)]
@@ -303,20 +302,22 @@ class ContactPair(Value):
     @property
     def outside(self) -> list[str]:
         """The reasons why the theorem does not apply to this pair; empty where it does."""
-        free = {self.contact_body: self.contact.free, self.neumann_body: self.neumann.free}
-        return reasons_outside(self.interface, self.friction, dict(sorted(free.items())))
+        return reasons_outside(self.interface, self.friction, {1: self.body1.free, 2: self.body2.free})
+
+    @property
+    def _meshed(self) -> list[Body]:
+        return [side.body for side in (self.body1, self.body2) if side.body is not None]
 
     @property
     def nearly_incompressible(self) -> str:
         """The keys that hold a Poisson ratio of LOCKING or more, for a message; empty where none does."""
-        return nearly_incompressible([side.body for side in (self.body1, self.body2) if side.body is not None])
+        return nearly_incompressible(self._meshed)
 
     @property
     def warnings(self) -> list[str]:
         """Facts that a user should know before trusting the numbers."""
-        bodies = [side.body for side in (self.body1, self.body2) if side.body is not None]
         path = [] if self.problem is None else path_warnings(self.problem)
-        return warnings_of(self.interface, self.friction, bodies) + path
+        return warnings_of(self.interface, self.friction, self._meshed) + path
 
 
 def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
