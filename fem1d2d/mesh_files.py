@@ -28,12 +28,6 @@ ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VEC
 #: Seconds on the clock for each second of processor time: the machine may do other work.
 PATIENCE = 6
 
-#: Folders of modules follow the arguments: the isolated mode leaves out the folders of the user and PYTHONPATH.
-START = (
-    "import runpy, sys; sys.path += sys.argv[5:]; del sys.argv[5:]; "
-    "runpy.run_path(sys.argv.pop(1), run_name='__main__')"
-)
-
 
 def from_file(path: Path | str, *, one_material: bool = True) -> Mesh:
     """A triangle mesh from a Gmsh (``.msh``) or Abaqus (``.inp``) file; its sides are the names of its lines.
@@ -84,15 +78,14 @@ def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints], dict[str
     """
     size = min(path.stat().st_size, MOST_BYTES)
     seconds, memory = int(SECONDS + SECONDS_PER_BYTE * size), int(MEMORY + MEMORY_PER_BYTE * size)
-    folders = [folder for folder in sys.path if os.path.isdir(folder) and not os.path.samefile(folder, os.curdir)]
-    python = [sys.executable, "-I", "-X", "utf8", "-c", START]
-    arguments = [mesh_reader.__file__, str(path), str(seconds), str(memory), *folders]
+    # what lies beside the files of a user is not imported
+    command = [sys.executable, "-P", "-X", "utf8", mesh_reader.__file__, str(path), str(seconds), str(memory)]
     # one thread of BLAS: each would claim memory
     environment = os.environ | dict.fromkeys(ONE_THREAD, "1")
     stdin, held = os.pipe()
     try:
         ended = subprocess.run(
-            [*python, *arguments],
+            command,
             stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -33,7 +33,7 @@ MARKED = """
 
     sys.meta_path.insert(0, Imports())
     from verification import comparison
-    from verification.semidefinite import lipschitz
+    from verification.semidefinite import lipschitz, losses
     from verification.cli import main
 
     def marked(module, name):

@@ -165,7 +165,7 @@ def test_rubbish_is_refused_whatever_it_is_called(tmp_path, content, ending):
     path = tmp_path / f"rubbish{ending}"
     path.write_bytes(content)
     with pytest.raises(
-        MeshError, match=r"no Gmsh file|meshio cannot read it|text in UTF-8|it promises|no triangles in it"
+        MeshError, match=r"no Gmsh file|meshio cannot read it|text in UTF-8|no triangles in it|do not fit its format"
     ):
         from_file(path)
 
@@ -341,16 +341,15 @@ def test_triangles_listed_clockwise_are_turned_over(tmp_path, turned):
     assert len(found.boundary) == 4
 
 
-@pytest.mark.parametrize("binary", [False, True])
 @pytest.mark.parametrize(("where", "node"), [("triangles", -1), ("triangles", -4), ("lines", -1)])
-def test_a_node_number_below_one_is_no_node_counted_from_the_end(tmp_path, binary, where, node):
+def test_a_node_number_below_one_is_no_node_counted_from_the_end(tmp_path, where, node):
     """meshio would take the last one: a valid square, of another body."""
     triangles, lines = TRIANGLES.copy(), [[3, 0]]
     if where == "triangles":
         triangles[1, 2] = node
     else:
         lines = [[node, 0]]
-    path = write(tmp_path / "body.msh", SQUARE, triangles, {"left": lines}, binary=binary)
+    path = write(tmp_path / "body.msh", SQUARE, triangles, {"left": lines})
     refused(path, f"an element names node {node + 1}: nodes are numbered from 1")
 
 
@@ -358,22 +357,6 @@ def test_a_node_number_below_one_of_format_4_is_refused(tmp_path):
     path = tmp_path / "square.msh"
     path.write_text(GMSH41.replace("6 2 11 9\n", "6 2 0 9\n"))
     refused(path, "an element names node 0: nodes are numbered from 1")
-
-
-@pytest.mark.parametrize(
-    ("text", "old", "new"),
-    [
-        (MSH, "4 0 1 0\n", "1e9 0 1 0\n"),
-        (GMSH41, "11\n0 0 0", "9999999999\n0 0 0"),
-        (GMSH41, "11\n0 0 0", "10000001\n0 0 0"),
-    ],
-)
-def test_a_node_number_that_would_fill_the_memory_is_refused(tmp_path, text, old, new):
-    path = tmp_path / "body.msh"
-    path.write_text(
-        (text.format(count=3, elements="\n".join([LINE, *CELLS])) if text == MSH else text).replace(old, new)
-    )
-    refused(path, r"a node has the number 1e\+(07|09|10): at most 10000000 is needed")
 
 
 def test_names_without_lines_are_left_out(tmp_path):

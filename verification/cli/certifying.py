@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,8 @@ import click
 from verification.cli.console import deliver, fail, stages
 from verification.cli.forms import cli
 from verification.cli.options import JSON, PATH, SET, SWAP, THETA, Registered, Typed, one_file
-from verification.cli.problems import load_problem
+from verification.cli.problems import load
+from verification.show.parts import Sections
 
 #: A certificate of a hundred contact nodes has a few megabytes.
 MOST_BYTES = 100_000_000
@@ -76,61 +77,42 @@ def certify(
       ndtheory certify --continuum my.toml --theta 0.6
     """
     context = click.get_current_context()
-    for first, used, second, also in (
-        ("--theta", theta, "--check", given),
-        ("-o", target, "--check", given),
-        ("--edition", edition, "--check", given),
-        ("--continuum", continuum or None, "--check", given),
-        ("--edition", edition, "--continuum", continuum or None),
-        ("--exact", exact or None, "--edition", edition),
-        ("--exact", exact or None, "--check", given),
-        ("--exact", exact or None, "--continuum", continuum or None),
+    used = {"--theta": theta, "-o": target, "--edition": edition, "--check": given}
+    used |= {"--exact": exact or None, "--continuum": continuum or None}
+    for option, *others in (
+        ("--check", "--theta", "-o", "--edition", "--continuum", "--exact"),
+        ("--continuum", "--edition", "--exact"),
+        ("--edition", "--exact"),
     ):
-        if used is not None and also is not None:
-            raise click.UsageError(f"received {first} with {second}: needed one of both", context)
+        if clash := [other for other in others if None not in (used[other], used[option])]:
+            raise click.UsageError(f"received {clash[0]} with {option}: needed one of both", context)
     if file is None and given is None:
         raise click.UsageError("received nothing: needed FILE, or --check FILE.json", context)
-    if continuum:
-        assert file is not None
-        return _prove_continuum(file, keys, theta=theta, swap=swap, target=target, as_json=as_json)
+    typed = None if file is None else Typed(file=file, keys=keys, theta=theta, swap=swap)
+    problem = None if typed is None else load(typed)
     if given is not None:
-        return _check(given, None if file is None else load_problem(file, keys, swap=swap), as_json)
-    assert file is not None
-    from verification.certificate.claims import NoCertificate
-    from verification.certificate.contraction import certify as prove
-    from verification.certificate.sections import sections
-    from verification.output.files import writing
-
-    problem = load_problem(file, keys, theta=theta, swap=swap)
-    try:
-        with stages() as tell:
-            found = prove(problem, edition=edition, exact=exact, progress=tell)
-    except NoCertificate as error:
-        return fail(error, "not proved", "no certificate")
-    typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
-    shown = lambda found: sections(found, target)
-    deliver(found, shown, as_json, writing(target), target, typing=typed.command)
-    return 0
-
-
-def _prove_continuum(
-    file: Path, keys: Mapping[str, str], *, theta: str | None, swap: bool, target: Path | None, as_json: bool
-) -> int:
-    """Bound the continuous problem of a file and show what follows; 1 where contraction is not proved."""
+        return _check(given, problem, as_json)
+    assert problem is not None
+    assert typed is not None
     from ndtheory.continuum.strip import Unproved
+    from verification.certificate import sections as shown
+    from verification.certificate.claims import NoCertificate
     from verification.certificate.continuum import certify_continuum
-    from verification.certificate.sections import continuum
+    from verification.certificate.contraction import certify as prove
     from verification.output.files import writing
 
-    problem = load_problem(file, keys, theta=theta, swap=swap)
+    sections: Callable[[Any], Sections] = shown.continuum if continuum else lambda found: shown.sections(found, target)
     try:
         with stages() as tell:
-            found = certify_continuum(problem, tell)
-    except Unproved as error:
-        return fail(error, "not proved", "nothing is proved")
-    typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
-    deliver(found, continuum, as_json, writing(target), target, typing=typed.command)
-    return 0 if found.contracts else 1
+            found: Any = (
+                certify_continuum(problem, tell)
+                if continuum
+                else prove(problem, edition=edition, exact=exact, progress=tell)
+            )
+    except (NoCertificate, Unproved) as error:
+        return fail(error, "not proved", "nothing is proved" if continuum else "no certificate")
+    deliver(found, sections, as_json, writing(target), target, typing=typed.command)
+    return 1 if continuum and not found.contracts else 0
 
 
 def _check(path: Path, problem: Any, as_json: bool) -> int:

@@ -83,7 +83,7 @@ def begin() -> None:
 def spend(stream: TextIO) -> OSError | None:
     """Write out what a stream holds; where it cannot be written, it goes nowhere, and the error is returned.
 
-    Python would write it again when it ends, and fail with a status of its own.
+    Python would write it again when it ends, fail, and return another status.
     """
     try:
         stream.flush()

@@ -254,14 +254,16 @@ def region(typed: Typed, target: Path, store: Path | None, as_json: bool) -> Non
       ndtheory region my.toml --set body2.young=7e4 -o stiff.svg
     """
     from verification import figures
-    from verification.output.files import writing
+    from verification.output.files import write_into
     from verification.sweeps.region import chart
     from verification.sweeps.sections import plane as sections
 
     problem = load(typed)
     with stages() as tell:
         plane = chart(problem, store=store, progress=tell)
-    write = writing(target, lambda plane, path: figures.save(figures.draw_region(plane), path))
-    deliver(plane, lambda found: sections(found, target), as_json, write, target)
+    deliver(plane, lambda found: sections(found, target), as_json)
+    with stages() as tell:
+        tell("drawing", None)
+        write_into(target, lambda path: figures.save(figures.draw_region(plane), path))
     if plane.interrupted:
         raise KeyboardInterrupt(f"{plane.reason['points']}: what was computed is drawn")

@@ -21,31 +21,33 @@ except ImportError:  # Windows
 
 Kind = Literal["run", "solve", "march", "compare", "verify", "reproduce"]
 
-_PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
 
-_LOSSES = ("waterfall.svg", "waterfall.png")
+def _drawn(*names: str) -> tuple[str, ...]:
+    return tuple(f"{name}.{ending}" for name in names for ending in ("svg", "png"))
 
-_TABLES = ("contact.csv", "history.csv")
 
-#: The rows behind each figure of Section 6.
-_ROWS = ("fig5.csv", "fig10.csv", "fig11.csv", "fig12.csv")
-
-_FIELDS = ("body1.vtu", "body2.vtu")
-
-_MATRICES = ("interface.npz", "P.npz")
-
-#: The views of a history, and the fields of its increments: of each body ``body1-0001.vtu``, .. in ``body1.pvd``.
-_VIEWS = tuple(f"{view}.{ending}" for view in ("loop", "states", "shear") for ending in ("svg", "png"))
+#: Gamma_c, matrices and fields of a result; the fields of an increment are ``body1-0001.vtu``, .. in ``body1.pvd``.
+_RESULT = ("contact.csv", "P.npz", "body1.vtu", "body2.vtu", *_drawn("bodies"))
 _SERIES = ("body1.pvd", "body2.pvd")
 _IN_SERIES = "body[12]-[0-9][0-9][0-9][0-9].vtu"
 
+#: The same with what only a run has.
+_RUN = (*_RESULT, "history.csv", "interface.npz", *_drawn("residuals"))
+
 #: The files that each command writes, beside the problem.
 FILES: dict[Kind, tuple[str, ...]] = {
-    "run": ("run.json", *_TABLES, *_MATRICES, *_FIELDS, *_PICTURES),
-    "solve": ("solve.json", *_TABLES[:1], *_MATRICES[1:], *_FIELDS, *_PICTURES[:2]),
-    "march": ("history.json", *_TABLES, *_SERIES, *_VIEWS),
-    "compare": ("compare.json", *_TABLES, *_MATRICES, *_FIELDS, *_PICTURES, *_LOSSES, "report.html"),
-    "reproduce": ("reproduce.json", "reproduce.svg", "reproduce.png", *_ROWS),
+    "run": ("run.json", *_RUN),
+    "solve": ("solve.json", *_RESULT),
+    "march": (
+        "history.json",
+        "contact.csv",
+        "history.csv",
+        "body1.pvd",
+        "body2.pvd",
+        *_drawn("loop", "states", "shear"),
+    ),
+    "compare": ("compare.json", *_RUN, *_drawn("waterfall"), "report.html"),
+    "reproduce": ("reproduce.json", *_drawn("reproduce"), *(f"fig{number}.csv" for number in (5, 10, 11, 12))),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -15,7 +16,8 @@ from hypothesis import strategies as st
 from fem1d2d.mesh import Floats
 from ndtheory import evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
-from verification.algorithm.relaxation import Constant, Newton, Rule, rule_of
+from verification.algorithm.iterate import Iterate
+from verification.algorithm.relaxation import Constant, Newton, Rule, Step, rule_of
 from verification.algorithm.runs import run
 from verification.algorithm.theta import below_one, choose, energy_bounds
 from verification.constants import measure
@@ -137,11 +139,21 @@ def solution(pair: ContactPair) -> tuple[Floats, float]:
     raise Fails(f"no solution to compare with: residual {done.last.residual:.2g}")
 
 
+def begun(rule: Rule, pair: ContactPair, theta: Fraction | str) -> Step:
+    """The rule at the beginning of a run, which makes the next g of an iterate."""
+    choice = choose(pair, theta, rule=rule)
+    return rule.begin(pair, float(choice.theta), choice.rho)
+
+
+def walk(rule: Rule, pair: ContactPair, theta: Fraction | str, start: Floats) -> Iterator[Iterate]:
+    """The iterates of a run, without end."""
+    return iterates(FixedPointMap(pair), begun(rule, pair, theta), start)
+
+
 def steps(rule: Rule, pair: ContactPair, theta: Fraction, start: Floats, count: int = STEPS) -> list[Floats]:
     """The g of the first steps of a run, as long as the residual is far above rounding."""
-    choice = choose(pair, theta, rule=rule)
     found: list[Floats] = []
-    for step in islice(iterates(FixedPointMap(pair), rule.begin(pair, float(choice.theta), choice.rho), start), count):
+    for step in islice(walk(rule, pair, theta, start), count):
         found.append(np.array(step.g))
         if not step.residual > CLEAR * step.scale:
             break
@@ -154,8 +166,7 @@ def steps(rule: Rule, pair: ContactPair, theta: Fraction, start: Floats, count: 
 def _stays(rule: Rule, pair: ContactPair) -> None:
     g, error = solution(pair)
     norm = pair.neumann.dual_norm
-    choice = choose(pair, below_one(float(proved_theta(pair)[0])), rule=rule)
-    step, at = rule.begin(pair, float(choice.theta), choice.rho), iterate_at(FixedPointMap(pair), g)
+    step, at = begun(rule, pair, below_one(float(proved_theta(pair)[0]))), iterate_at(FixedPointMap(pair), g)
     for n in (1, 2):
         moved = norm(step(at) - g)
         if not moved <= 1e-7 * at.scale + 100 * error:
@@ -220,12 +231,8 @@ def _starts_afresh(rule: Rule, case: dict[str, Any], other: dict[str, Any]) -> N
     first = steps(rule, **case)
     steps(rule, **other)
     _compare(first, steps(rule, **case), "after another run", same=0.0)
-    runs = []
-    for given in (case, other):
-        choice = choose(given["pair"], given["theta"], rule=rule)
-        step = rule.begin(given["pair"], float(choice.theta), choice.rho)
-        runs.append(iterates(FixedPointMap(given["pair"]), step, given["start"]))
-    beside = [np.array(step.g) for step, _ in zip(*(islice(found, len(first)) for found in runs), strict=True)]
+    runs = [islice(walk(rule, **given), len(first)) for given in (case, other)]
+    beside = [np.array(step.g) for step, _ in zip(*runs, strict=True)]
     _compare(first, beside, "beside another run", same=0.0)
 
 
@@ -274,13 +281,10 @@ def _rate(kit: Kit, rule: Rule) -> Finding:
         tried += 1
         g, error = solution(pair)
         norm, rho = pair.neumann.dual_norm, found.rho.value
-        choice = choose(pair, "auto", rule=rule)
         first = norm(start - g)
         noise = 10 * error + 1e-12 * (norm(start) + norm(g) + norm(pair.neumann.load))
         beaten = False
-        for n, step in enumerate(
-            islice(iterates(FixedPointMap(pair), rule.begin(pair, float(choice.theta), choice.rho), start), 80)
-        ):
+        for n, step in enumerate(islice(walk(rule, pair, "auto", start), 80)):
             off = norm(step.g - g)
             if off > CONSTANT * sqrt(1 + rho) * rate**n * first + noise:
                 raise Fails(f"after {n} steps the error is {off / first:.2g} of the first, claimed is {rate:.4g}^n")
