@@ -4,11 +4,11 @@ The document of a result, the reason beside each key that is null, the table of 
 
 >>> @dataclass(frozen=True, kw_only=True)
 ... class Plan(Part):
-...     asked: int = key("number of rows of the grid", unit="1")
-...     stored: int | None = key("rows that the store has", unit="1", null="without a store")
+...     asked: int = key("number of rows of the grid")
+...     stored: int | None = key("rows that the store has", null="without a store")
 ...
 ...     @property
-...     @says("rows that would be made", unit="1")
+...     @says("rows that would be made")
 ...     def left(self) -> int:
 ...         return self.asked - (self.stored or 0)
 >>> Plan(asked=3, stored=None).to_dict()
@@ -19,6 +19,7 @@ The document of a result, the reason beside each key that is null, the table of 
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, replace
@@ -29,15 +30,14 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
-from ndtheory.number import Number
-
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 
 #: Names of types of Python in the tables; a class of parts is named, or is an object whose keys follow.
-TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"} | {
-    Number: "Number"
-}
+TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"}
+
+#: The types that have a unit.
+NUMBERS = {"integer", "number", "Number"}
 
 #: The value of a key that is left out although its value could also be null.
 ABSENT: Any = object()
@@ -51,8 +51,10 @@ class Key:
 
     Attributes
     ----------
-    says, unit : str
-        Its meaning and its unit; empty where there is none.
+    says : str
+        Its meaning.
+    unit : str or None
+        Its unit; by default numbers are pure, of the unit 1.
     null, absent : str or None
         When the value is null, and when the key is left out; None for never.
     why : str or function of the result, or None
@@ -71,7 +73,7 @@ class Key:
     """
 
     says: str = ""
-    unit: str = ""
+    unit: str | None = None
     null: str | None = None
     absent: str | None = None
     why: str | Callable[[Any], str] | None = ""
@@ -96,7 +98,8 @@ class Key:
 
     def row(self, name: str, kind: str) -> Row:
         """Its row in a table."""
-        return Row(keys=(name,), type=kind, unit=self.unit, says=self.says, null=self.null, absent=self.absent)
+        unit = self.unit if self.unit is not None else "1" if NUMBERS & {*kind.split()} else ""
+        return Row(keys=(name,), type=kind, unit=unit, says=self.says, null=self.null, absent=self.absent)
 
 
 def _once(compute: Callable[[type], T]) -> Callable[[type], T]:
@@ -110,13 +113,27 @@ def key(says: str = "", *, default: Any = MISSING, default_factory: Any = MISSIN
 
 
 def says(says: str = "", **more: Any) -> Callable[[F], F]:
-    """Make a property a key: this decorator stands below ``@property``; arguments as of :class:`Key`."""
+    """Make a property a key: this decorator stands below ``@property``; arguments as of :class:`Key`.
+
+    Without a meaning the first paragraph of the docstring is the meaning.
+    """
 
     def mark(function: F) -> F:
-        vars(function)["key"] = Key(says=says, **more)
-        return function
+        summary = " ".join((function.__doc__ or "").partition("\n\n")[0].split()).replace("``", "`").rstrip(".")
+        return _marked(function, Key(says=says or summary[:1].lower() + summary[1:], **more))
 
     return mark
+
+
+def _marked(function: F, one: Key) -> F:
+    vars(function)["key"] = one
+    return function
+
+
+def derived(says: str, of: Callable[[Any], Any], hint: Any = str, **more: Any) -> Any:
+    """A property of a type that only looks a value up in parts of a result, as a key; arguments as of :class:`Key`."""
+    of.__annotations__["return"] = hint
+    return property(_marked(of, Key(says=says, **more)), doc=says)
 
 
 class Part:
@@ -156,13 +173,16 @@ def document(result: Any) -> dict[str, Any]:
         if value is ABSENT or (value is None and one.absent is not None and one.null is None):
             continue
         if one.spread:
+            reasons = found.get("reason", {})
             found |= plain(value)
+            if reasons:
+                found["reason"] = reasons | found["reason"]
             continue
         name = one.name or attribute
         above, _, last = name.rpartition(".")
         inside = _inside(found, above)
         inside[last] = plain(value)
-        if inside[last] is None and one.explained:
+        if inside[last] is None and one.explained and above in explained:
             inside["reason"][last] = one.reason(result, name)
     for above in explained:  # it comes last
         inside = _inside(found, above)
@@ -187,9 +207,13 @@ def _explained(cls: type) -> tuple[str, ...]:
 
 
 def plain(value: Any) -> Any:
-    """A value as documents have it."""
-    if value is None or isinstance(value, (bool, int, float, str)):
+    """A value as documents have it; a number that is not finite is null."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (bool, int, str)):
         return value
+    if hasattr(value, "content"):  # a document inside another one
+        return value.content()
     if hasattr(value, "to_dict"):
         return value.to_dict()
     if isinstance(value, Mapping):
@@ -254,8 +278,10 @@ def _rows(cls: type) -> Iterator[Row]:
     for attribute, one in keys(cls).items():
         kind, inside = (one.type, None) if one.type else named_type(annotation(cls, attribute))
         name = one.name or attribute
+        if one.inside and not one.type:
+            kind = "list of object" if kind.startswith("list") else "object"
         if one.spread:
-            yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,)),)
+            yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,), says=one.says),)
             continue
         if inside and kind.startswith("map of "):  # its members have a row
             name, kind = f"{name}.*", kind.removeprefix("map of ")
@@ -263,20 +289,25 @@ def _rows(cls: type) -> Iterator[Row]:
         yield from (each.row(f"{name}.{below}", each.type) for below, each in one.inside.items())
         for row in _rows(inside) if inside else ():
             yield replace(row, keys=tuple(f"{name}.{each}" for each in row.keys))
-    for above in _explained(cls):
+    among = [annotation(cls, attribute) for attribute, one in keys(cls).items() if one.spread]
+    for above in set(_explained(cls)).difference(*map(_explained, among)):  # these bring their own row
         yield Row(keys=(f"{above}.reason".lstrip("."),), type="map of text", says="why a key is null")
 
 
 def annotation(cls: type, attribute: str) -> Any:
     """The type of a field or property; names that its module imports for types alone are not known."""
+    base, text = written(cls, attribute)
+    return eval(text, {**vars(sys.modules[base.__module__]), **vars(base)}) if isinstance(text, str) else text
+
+
+def written(cls: type, attribute: str) -> tuple[type, Any]:
+    """The class that has a field or property, and its type as it is written there."""
     for base in cls.__mro__:
         value = vars(base).get(attribute)
         function = getattr(value, "fget", None) or getattr(value, "func", None)
-        written = vars(base).get("__annotations__", {}).get(attribute)
-        written = function.__annotations__["return"] if function else written
-        if written is not None:
-            known = {**vars(sys.modules[base.__module__]), **vars(base)}
-            return eval(written, known) if isinstance(written, str) else written
+        text = function.__annotations__["return"] if function else vars(base).get("__annotations__", {}).get(attribute)
+        if text is not None:
+            return base, text
     raise AttributeError(f"{cls.__name__}.{attribute} has no type")
 
 
@@ -297,21 +328,3 @@ def named_type(hint: Any) -> tuple[str, type | None]:
     if isinstance(hint, type) and issubclass(hint, Part):
         return (hint.part, None) if hint.part else ("object", hint)
     return TYPES.get(hint, "free"), None
-
-
-def parts(cls: type) -> dict[str, type]:
-    """The classes of the named parts that the table of a class refers to, by their names, also those inside them."""
-    found: dict[str, type] = {}
-    for attribute, one in keys(cls).items():
-        for each in _classes(annotation(cls, attribute)) if not one.type else ():
-            if each.part not in found:
-                found |= {each.part: each} if each.part else {}
-                found |= {name: one for name, one in parts(each).items() if name not in found}
-    return found
-
-
-def _classes(hint: Any) -> Iterator[type[Part]]:
-    if isinstance(hint, type) and issubclass(hint, Part):
-        yield hint
-    for inside in get_args(hint):
-        yield from _classes(inside)

@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal, InvalidOperation, localcontext
 from fractions import Fraction
-from typing import Any, Literal, TypeAlias, get_args
+from typing import ClassVar, Literal, TypeAlias, get_args
 
+from ndtheory.keys import Part, key
 from ndtheory.scalar import Scalar
 
 #: What a user may write where a number is read exactly, see :func:`exact`.
@@ -82,20 +83,13 @@ def directed(x: float | Decimal | Fraction, digits: int, *, up: bool) -> Decimal
 
 
 @dataclass(frozen=True, kw_only=True)
-class Number:
+class Number(Part):
     """A value with its enclosure and level of proof.
 
-    Attributes
-    ----------
-    value : float
-        The nearest double.
-    lo, hi : float or None
-        Ends of an enclosure: the true number is at least ``lo``, at most ``hi``.  Only one may be known; at level
-        ``float`` none is, at the other levels at least one.
-    level : {'exact', 'verified', 'guaranteed', 'float'}
-        The origin of the enclosure, from the strongest: the double is the number; arithmetic that bounds all its
-        rounding errors; such arithmetic and a proved estimate of the rest; none.  A derived number has the weakest
-        level of its inputs (:func:`weakest`), and ``float`` where a rounding error was not bounded.
+    The true number is at least ``lo``, at most ``hi``.  Only one may be known; at level ``float`` none is, at the other
+    levels at least one.  The level is the origin of the enclosure, from the strongest: the double is the number;
+    arithmetic that bounds all its rounding errors; such arithmetic and a proved estimate of the rest; none.  A derived
+    number has the weakest level of its inputs (:func:`weakest`), and ``float`` where a rounding error was not bounded.
 
     Raises
     ------
@@ -108,10 +102,15 @@ class Number:
     {'value': 0.5, 'lo': None, 'hi': None, 'level': 'float'}
     """
 
-    value: float
-    lo: float | None = None
-    hi: float | None = None
-    level: Level = "float"
+    part: ClassVar[str] = "Number"
+
+    value: float = key("the nearest double", unit="")
+    lo: float | None = key("an enclosure", unit="", null="at level `float`", why=None, default=None)
+    hi: float | None = key("an enclosure", unit="", null="at level `float`", why=None, default=None)
+    level: Level = key(
+        "`exact`, `verified`, `guaranteed` or `float`: what is claimed about the enclosure; for a `float` nothing is",
+        default="float",
+    )
 
     def __post_init__(self) -> None:
         if self.level == "float" and self.lo is None and self.hi is None:
@@ -150,10 +149,6 @@ class Number:
         if not (math.isfinite(lo) and math.isfinite(hi)):
             return cls(value=nearest)
         return cls(value=nearest, lo=lo, hi=hi, level=level if lo == hi else weakest([level, "verified"]))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The JSON object of the interface."""
-        return {"value": self.value, "lo": self.lo, "hi": self.hi, "level": self.level}
 
 
 def exact(value: Numeric) -> Fraction:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from verification.problem import Problem
 
 
-class Document(Value, ABC):
+class Document(Value, keys.Part, ABC):
     """A frozen result that can be written as one JSON document; subclasses name their schema, and their keys by
     :func:`ndtheory.keys.key` and :func:`ndtheory.keys.says`.
 

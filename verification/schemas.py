@@ -47,29 +47,33 @@ def tables() -> dict[str, tuple[Row, ...]]:
         for name, each in data.items()
     }
     registry.load("documents", "")
-    classes = {table: each for each in subclasses(Document) if keys.keys(each) and (table := each.key_table())}
-    named = {name: each for cls in classes.values() for name, each in keys.parts(cls).items()}
-    written = [name for name in found if name.startswith("ndtheory.")]
-    made = {name: tuple(_header(cls)) + keys.rows(cls) for name, cls in classes.items()}
-    parts = {name: keys.rows(cls) for name, cls in named.items()}
-    rest = {name: each for name, each in found.items() if name not in written}
-    return {name: found[name] for name in written} | made | rest | parts
+    classes = {each.key_table(): each for each in subclasses(Document) if keys.keys(each) and vars(each).get("schema")}
+    parts = {part: each for each in subclasses(keys.Part) if (part := vars(each).get("part"))}
+    written = {name: found.pop(name) for name in list(found) if name.startswith("ndtheory.")}
+    made = {
+        name: header(cls) + ((included(cls.part),) if cls.part else keys.rows(cls)) for name, cls in classes.items()
+    }
+    return written | made | found | {name: keys.rows(cls) for name, cls in parts.items()}
 
 
-def _header(cls: type[Document]) -> Iterator[Row]:
-    """Yield the rows with which the table of a document begins; without a field for a problem it never has one."""
-    yield Row(keys=(f"{INCLUDED}Header",))
-    if problem := vars(cls)["__dataclass_fields__"].get("problem"):
-        absent = "where that is no problem file" if "None" in problem.type else None
-        yield Row(keys=("problem",), type="Problem", says="what the result is about", absent=absent)
-    if cls.kind:
-        yield Row(keys=("kind",), type="text", says=f"`{cls.kind}`")
+def header(cls: type[Document]) -> tuple[Row, ...]:
+    """Return the rows with which the table of a document begins: it has a problem where its class declares one."""
+    base, hint = keys.written(cls, "problem")
+    says, absent = "what the result is about", "where that is no problem file" if "None" in str(hint) else None
+    problem = Row(keys=("problem",), type="Problem", says=says, absent=absent)
+    kind = [Row(keys=("kind",), type="text", says=f"`{cls.kind}`")] if cls.kind else []
+    return (included("Header"), *([] if base is Document else [problem]), *kind)
 
 
-def subclasses(cls: type[Document]) -> Iterator[type[Document]]:
+def included(part: str) -> Row:
+    """Return the row that includes all keys of a part."""
+    return Row(keys=(INCLUDED + part,))
+
+
+def subclasses(cls: Any) -> Iterator[Any]:
     """Yield the classes that derive from one, of this program."""
     for each in cls.__subclasses__():
-        if each.__module__.startswith("verification."):
+        if each.__module__.startswith(("verification.", "ndtheory.")):
             yield each
         yield from subclasses(each)
 

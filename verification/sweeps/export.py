@@ -43,7 +43,7 @@ def dataset(sweep: Sweep) -> xarray.Dataset:
     units = {"1": "1"} | dict(sweep.units)
 
     def attributes(name: str, words: bool) -> dict[str, str]:
-        return {"long_name": title(name, {})} | ({} if words else {"units": units[COLUMNS[name].unit]})
+        return {"long_name": title(name, {})} | ({} if words else {"units": units[COLUMNS[name].unit or "1"]})
 
     coordinates: dict[str, Any] = {}
     for name, values in axes.items():
