@@ -115,7 +115,7 @@ def key(says: str = "", *, default: Any = MISSING, default_factory: Any = MISSIN
 def says(says: str = "", **more: Any) -> Callable[[F], F]:
     """Make a property a key: this decorator stands below ``@property``; arguments as of :class:`Key`.
 
-    Without a meaning the key has that of the docstring's first paragraph.
+    Without a meaning the first paragraph of the docstring is the meaning.
     """
 
     def mark(function: F) -> F:

@@ -142,7 +142,7 @@ def _root(square: Fraction) -> Number:
 
 
 #: Arguments of the keys of upper bounds; the certificate gives their reasons.
-AT_MOST: dict[str, Any] = {"of": upper, "unit": "1", "type": "Number", "why": None}
+AT_MOST: dict[str, Any] = {"of": upper, "type": "Number", "why": None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +165,6 @@ class ContinuumConstants(Part):
     rho: Fraction | None = key(r"at most, $(1 + \varepsilon)R$", null=r"where $\varepsilon$ is", **AT_MOST)
     rho_ends: Fraction = key(
         r"at least: the bound from the wedges at the ends of $\Gamma_c$; not less than `rho_least`",
-        unit="1",
         of=lower,
         type="Number",
     )

@@ -223,16 +223,12 @@ class Region(Part):
     """The (theta, k) for which a bound proves contraction; below the first friction the region does not shrink."""
 
     k: tuple[float, ...] = key(
-        "friction, increasing: between two of them the border is a straight line, off by at most 1 %", unit="1"
+        "friction, increasing: between two of them the border is a straight line, off by at most 1 %"
     )
-    theta: tuple[Ends, ...] = key("for each `k` the ends of the interval of theta", unit="1")
-    every: float = key("friction below which every small theta contracts", unit="1", name="every_small_theta")
+    theta: tuple[Ends, ...] = key("for each `k` the ends of the interval of theta")
+    every: float = key("friction below which every small theta contracts", name="every_small_theta")
     some: float | None = key(
-        "friction below which some theta does",
-        unit="1",
-        name="some_theta",
-        null="where it was not worked out",
-        why=None,
+        "friction below which some theta does", name="some_theta", null="where it was not worked out", why=None
     )
 
 

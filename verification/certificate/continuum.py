@@ -54,9 +54,9 @@ MOST_ALONG, MOST_CELLS = 320, 30_000
 
 #: What keys share that are null together.
 MESH: dict[str, Any] = {"default": None, "why": lambda mesh: mesh.why}
-MEASURED = MESH | {"unit": "1", "null": "where `mesh.interface_nodes` is"}
+MEASURED = MESH | {"null": "where `mesh.interface_nodes` is"}
 OF_CELLS = MEASURED | {"null": "where the grids have no ratio that is done", "why": lambda mesh: mesh.why_no_cells}
-IF_INTERVAL: dict[str, Any] = {"unit": "1", "null": "where `interval` is"}
+IF_INTERVAL: dict[str, Any] = {"null": "where `interval` is"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ class FileMesh(Part):
     """The mesh of a file, in doubles; ``why`` it was not measured, and ``why_no_cells``."""
 
     interface_nodes: int | None = key(
-        "contact nodes of the file's mesh", null="where it is too fine for a quick answer, or refused", **MESH
+        "contact nodes of the file's mesh", unit="", null="where it is too fine for a quick answer, or refused", **MESH
     )
     rho: Number | None = key(r"$\rho$ of the file's mesh", **MEASURED)
     rho_normal: Number | None = key(r"$\rho_N$ of the file's mesh", **MEASURED)
@@ -79,7 +79,6 @@ class FileMesh(Part):
     )
     theta: float | None = key(
         r"the file's $\theta$, with `auto` `theta_proved`",
-        unit="1",
         null="where there is none",
         why="the file gives no theta, and none is proved in the continuum",
     )
@@ -113,25 +112,21 @@ class ContinuumCertificate(Document):
     problem: Problem
     energy: EnergyBounds | None
     constants: ContinuumConstants = key()
-    rho_least: Number = key("at least: the bound from half-planes", unit="1", name="constants.rho_least")
-    kappa_1: Number = key("at most, at the file's friction", unit="1", name="constants.kappa_1")
-    kappa_2: Number = key("at most, at the file's friction", unit="1", name="constants.kappa_2")
-    friction: float = key("$k$, the largest one where it varies", unit="1")
-    friction_threshold: Number = key(r"at least: every small $\theta$ contracts for smaller $k$", unit="1")
+    rho_least: Number = key("at least: the bound from half-planes", name="constants.rho_least")
+    kappa_1: Number = key("at most, at the file's friction", name="constants.kappa_1")
+    kappa_2: Number = key("at most, at the file's friction", name="constants.kappa_2")
+    friction: float = key("$k$, the largest one where it varies")
+    friction_threshold: Number = key(r"at least: every small $\theta$ contracts for smaller $k$")
     friction_limit: Number | None = key(
-        r"at least: some $\theta$ contracts for smaller $k$",
-        unit="1",
-        null=r"without friction or without a bound of $\rho$",
+        r"at least: some $\theta$ contracts for smaller $k$", null=r"without friction or without a bound of $\rho$"
     )
     solvable: bool = key("whether (P1) is proved to have exactly one solution")
-    interval: list[float] | None = key(r"every $\theta$ inside contracts", unit="1", null="where none is proved to")
+    interval: list[float] | None = key(r"every $\theta$ inside contracts", null="where none is proved to")
     theta_max_proved: Number | None = key("its upper end, at least", **IF_INTERVAL)
     theta_proved: float | None = key(r"the $\theta$ with the least proved factor", **IF_INTERVAL)
     factor_proved: Number | None = key("the factor there, at most", **IF_INTERVAL)
-    theta: float | None = key("the theta of the file", unit="1", null=r"for `auto` and without a bound of $\rho$")
-    factor: Number | None = key(
-        "the factor at `theta`, at most", unit="1", null="where `theta` is, or lies outside `interval`"
-    )
+    theta: float | None = key("the theta of the file", null=r"for `auto` and without a bound of $\rho$")
+    factor: Number | None = key("the factor at `theta`, at most", null="where `theta` is, or lies outside `interval`")
     verdict: str = key(
         r"`contraction` where it is proved at `theta`, with `auto` at some $\theta$; else `no conclusion`;"
         " for the continuum"

@@ -71,7 +71,7 @@ CLAIM = {
         absent="without friction, and where the kernel is another one: $k$ varies, or grids that differ meet along a"
         " line that is not level",
     ),
-    "bits": Key(says="bits of the balls in which the checker decides", type="integer"),
+    "bits": Key(says="bits of the balls in which the checker decides", type="integer", unit=""),
     "multipliers.lambda": _multipliers(unit="1"),
     "multipliers.tau": _multipliers(unit="1"),
     "multipliers.a": _multipliers(unit="length/stress"),
@@ -82,7 +82,7 @@ CLAIM = {
 DISCRETE = {
     "body1": Key(says="the lower body", type="Body in rationals"),
     "body2": Key(says="the upper body", type="Body in rationals"),
-    "neumann_body": Key(says="which body has the Neumann problem", type="integer"),
+    "neumann_body": Key(says="which body has the Neumann problem", type="integer", unit=""),
     "friction": _rational(says="rational: k, the largest one where it varies"),
     "weights": Key(says="$w_j$ at the contact nodes", type="list of text", unit="length"),
     "kernel": _rows(
@@ -109,7 +109,6 @@ class Certificate(Document):
     claim: dict[str, Any] = key(inside=CLAIM, type="object")
     lower: float | None = key(
         "the largest factor found of two forces, in doubles: no certificate proves less",
-        unit="1",
         null="for another edition than `lmi`",
         why="not computed for this edition",
     )

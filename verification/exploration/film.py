@@ -63,14 +63,12 @@ class FilmedRun(Part):
         By bound: the factor that it proves for one step; None where it has no conclusion.
     """
 
-    theta: float = key(unit="1")
-    friction: float = key(unit="1")
+    theta: float = key()
+    friction: float = key()
     outcome: str = key("as in **Run**; or why there is no run, or why a history ended early")
-    iterations: int | None = key(
-        "of a history those of all increments", unit="1", null="where there is no run", why=None
-    )
+    iterations: int | None = key("of a history those of all increments", null="where there is no run", why=None)
     rate: float | None = key(
-        "observed rate as in **Run**", unit="1", null="where too few steps show it, and of a history", why=None
+        "observed rate as in **Run**", null="where too few steps show it, and of a history", why=None
     )
     residuals: tuple[float, ...]
     steps: tuple[int, ...]
@@ -95,7 +93,7 @@ class Film(Part):
     why_no_region: str
 
     @property
-    @says("1 or 2")
+    @says("1 or 2", unit="")
     def neumann_body(self) -> int:
         return self.pair.neumann_body
 

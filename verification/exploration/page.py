@@ -47,11 +47,7 @@ FORMULAS = (
 
 
 #: What keys of exact numbers share that documents have in doubles.
-DOUBLES: dict[str, Any] = {
-    "unit": "1",
-    "type": "list of number",
-    "of": lambda values: [float(value) for value in values],
-}
+DOUBLES: dict[str, Any] = {"type": "list of number", "of": lambda values: [float(value) for value in values]}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -74,15 +74,16 @@ def _text(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def draw_rules(panels: Mapping[str, Sequence[Row]], *, columns: int = 2) -> Figure:
+def draw_rules(panels: Mapping[str, Sequence[Row]]) -> Figure:
     """Steps over E1/E2, a curve for each rule, solid and with full markers where its rate is proved.
 
     ``panels`` maps titles to rows of sweeps, which need the columns young1, young2, rule, iterations and proved_rate; a
-    run that did not arrive has no point.  ``columns`` panels lie side by side.  No rows raise ValueError.
+    run that did not arrive has no point.  Two panels lie side by side.  No rows raise ValueError.
     """
     names = list(dict.fromkeys(row["rule"] for rows in panels.values() for row in rows))
     if not names:
         raise ValueError("needed at least one row")
+    columns = min(2, len(panels))
     with styled():
         lines = -(-len(panels) // columns)
         figure = new_figure(7.2, 0.8 + 2.4 * lines)

@@ -57,7 +57,7 @@ class Ledger(Document):
         return ", ".join(f"{count} {verdict}" for verdict, count in self.counts.items())
 
     @property
-    @says("how many statements have each verdict", unit="1")
+    @says("how many statements have each verdict")
     def counts(self) -> dict[str, int]:
         verdicts = [row.verdict for row in self.rows]
         return {verdict: verdicts.count(verdict) for verdict in dict.fromkeys(verdicts)}

@@ -93,7 +93,7 @@ OPTIMUM = Claim(
 
 
 #: What the steps at the printed theta share.
-IF_CONVERGED: dict[str, Any] = {"unit": "1", "null": "where it does not converge", "why": None}
+IF_CONVERGED: dict[str, Any] = {"null": "where it does not converge", "why": None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,10 +106,10 @@ class Curve(Part):
     label: str = key("what the curve varies")
     steps: Mapping[float, int | None]
     unrelaxed: Mapping[float, int | None]
-    rho: float | None = key(r"$\rho$", unit="1", type="number")
+    rho: float | None = key(r"$\rho$", type="number")
 
     @property
-    @says("by the increment test", unit="1", name="fewest_steps", null="where no theta converges", why=None)
+    @says("by the increment test", name="fewest_steps", null="where no theta converges", why=None)
     def fewest(self) -> int | None:
         return min((n for n in self.steps.values() if n is not None), default=None)
 

@@ -58,7 +58,6 @@ class Outcome(Part):
     closeness: float = key(
         r"how near it comes: the share of $\Gamma_c$ in the printed state, or the fewest steps over those at 0.6 on the"
         " worst curve",
-        unit="1",
         default=0.0,
     )
     contact: ContactFields | None = key(
@@ -142,7 +141,7 @@ class Reproduction(Document):
         return max((outcome.reading for outcome in self.results[0].outcomes), key=score)
 
     @property
-    @says("how many figures it reproduces", unit="1", name="closest.reproduced")
+    @says("how many figures it reproduces", name="closest.reproduced")
     def reproduced_closest(self) -> int:
         return self.reproduced(self.closest)
 

@@ -46,7 +46,7 @@ class ModelReading(Part):
     position: str = key("where the upper body sits, or `half model`")
     moved: str = key("which part of its top is moved")
     top: str = key("whether that may slide")
-    neumann_body: Literal[1, 2] = key("1 as in Section 6, 2 as in Section 3", type="integer")
+    neumann_body: Literal[1, 2] = key("1 as in Section 6, 2 as in Section 3", type="integer", unit="")
     moduli: str = key("`as printed`, or `exchanged`: the upper body has the larger one")
 
     @property

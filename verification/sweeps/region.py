@@ -36,11 +36,11 @@ MOST_STEPS = 300
 class Point(Part):
     """Outcome of a run."""
 
-    theta: float = key("where in the plane", unit="1")
-    k: float = key("where in the plane", unit="1")
+    theta: float = key("where in the plane")
+    k: float = key("where in the plane")
     outcome: Outcome = key("as in **Run**", type="text")
-    iterations: int = key(unit="1")
-    coupled_residual: float | None = key("as in **Run**", unit="1", null="without a force", why=None)
+    iterations: int = key()
+    coupled_residual: float | None = key("as in **Run**", null="without a force", why=None)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -40,8 +40,8 @@ KEPT = 16
 REFUSED, ERROR = "refused", "error"
 FAILED = (REFUSED, ERROR)
 
-_number = partial(Key, type="number", unit="1")
-_whole = partial(Key, type="integer", unit="1")
+_number = partial(Key, type="number")
+_whole = partial(Key, type="integer")
 _text = partial(Key, type="text")
 REFUSED_MATRICES = "where the row was refused and the pair comes from matrices"
 NO_MODULUS = "of a rigid body, and of a pair made from matrices"
@@ -93,8 +93,8 @@ GIVEN, RESULTS = tuple(COLUMNS)[:9], tuple(COLUMNS)[9:]
 
 def title(column: str, units: Mapping[str, str]) -> str:
     """Return the full name of a column, with its unit where that is not 1."""
-    one = COLUMNS[column]
-    return one.says.partition(";")[0] + (f" ({units[one.unit]})" if one.unit and one.unit in units else "")
+    unit = units.get(COLUMNS[column].unit or "", "")
+    return COLUMNS[column].says.partition(";")[0] + (f" ({unit})" if unit else "")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

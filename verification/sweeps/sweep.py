@@ -44,7 +44,7 @@ class Sweep(Document):
     schema: ClassVar[str] = "ndtheory.sweep/1"
 
     axes: tuple[str, ...] = key("the columns that vary")
-    asked: int = key("how many rows the grid has", unit="1")
+    asked: int = key("how many rows the grid has")
     rows: tuple[Row, ...] = key("one run each, theta changing fastest", type="list of object", inside=COLUMNS)
     units: Mapping[str, str]
     grid: SweepGrid

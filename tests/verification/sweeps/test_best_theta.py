@@ -132,7 +132,7 @@ def test_a_curve_of_the_figure_ends_where_its_proof_does(small):
 def test_rules_are_drawn_solid_where_a_rate_is_proved():
     rows = vf.sweep(SMALL, friction=[0], rule=["constant", "momentum", "aitken"], theta=[0.6]).rows
     rows += vf.sweep(SMALL.changed(young=(1, 1)), rule=["constant", "momentum", "aitken"], theta=[0.6]).rows
-    (ax,) = draw_rules({"both": rows}, columns=1).axes
+    (ax,) = draw_rules({"both": rows}).axes
     lines = [line for line in ax.get_lines() if len(line.get_xdata())]
     for dashed, solid, rule in zip(lines[::2], lines[1::2], ("constant", "momentum", "aitken"), strict=True):
         mine = sorted((row for row in rows if row["rule"] == rule), key=lambda row: row["young1"] / row["young2"])
