@@ -25,8 +25,8 @@ from verification.algorithm.linearisation import NotLinear, linearised_rate
 from verification.algorithm.loop import Ending, Outcome, follow
 from verification.algorithm.monolithic import SolveError
 from verification.algorithm.rates import Noise, ObservedRate, rate_of
-from verification.algorithm.relaxation import Constant, Relaxation, Rule, Step, rule_of
-from verification.algorithm.theta import Choice, begin
+from verification.algorithm.relaxation import Constant, Relaxation, Rule, rule_of
+from verification.algorithm.theta import Choice, choose
 from verification.constants import Measured, measure
 from verification.contact import ContactError
 from verification.interface.interface import Law
@@ -277,12 +277,12 @@ def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str
     found["rho"] = None if measured.rho_max is None else measured.rho_max.value
     why = {} if measured.rho_max else {"rho": measured.reason["rho_max"]}
     rule = rule_of(values.get("rule", pair.settings.relaxation))
-    chosen_rule, choice, step = begin(pair, values.get("theta"), rule, measured)
+    choice = choose(pair, values.get("theta"), measured, rule=rule)
     found |= {"theta": float(choice.theta), "rule": rule.name}
-    proved, unproved = _proved(setting, chosen_rule, choice)
+    proved, unproved = _proved(setting, rule, choice)
     found |= proved
     why |= unproved
-    columns, unmet = course(pair, chosen_rule, choice, step, setting.pieces)
+    columns, unmet = course(pair, rule, choice, setting.pieces)
     found |= columns
     return why | unmet
 
@@ -351,9 +351,7 @@ class Undecided(Exception):
     """Rounding decides when a run ends: its steps must be evaluated one by one."""
 
 
-def course(
-    pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces
-) -> tuple[dict[str, Any], dict[str, str]]:
+def course(pair: ContactPair, rule: Rule, choice: Choice, pieces: KnownPieces) -> tuple[dict[str, Any], dict[str, str]]:
     """Run a pair from its start until both tests are met, or the run stalls, runs away or reaches its limit.
 
     Returns
@@ -370,7 +368,7 @@ def course(
     ContactError
         Step II did not reach its certificate before the run ended.
     """
-    T = pieces.map()
+    T, step = pieces.map(), rule.begin(pair, float(choice.theta), choice.rho)
     went = None
     if isinstance(step, Relaxation) and not pair.held:
         with suppress(Undecided):
