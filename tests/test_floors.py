@@ -66,7 +66,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
     },
     "runs over grids": {
-        "verification.sweeps": ("__init__ best_theta course export grid region row sections store sweep workers")
+        "verification.sweeps": ("__init__ best_theta export grid pieces region row sections store sweep workers")
     },
     "couplings": {
         "verification.coupling": (

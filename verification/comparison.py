@@ -14,7 +14,7 @@ from verification.algorithm.rates import StepRatio, largest_step_ratio
 from verification.algorithm.reference import Reference, by_cvxpy_alone
 from verification.algorithm.relaxation import Constant
 from verification.algorithm.runs import Run, check_memory, run
-from verification.algorithm.theta import Choice, begin
+from verification.algorithm.theta import Choice, choose
 from verification.bounds.bound import BY_NAME, NOT_ASKED, BoundResult, Subject
 from verification.bounds.losses import Losses
 from verification.bounds.table import EnergyOfPair, chosen
@@ -250,7 +250,7 @@ def compare(
     pair = pair_of(problem)
     check_memory(pair)  # before anything is shown of a run that would be refused
     measured = measure(pair, verified=verified, progress=progress)
-    choice, subject = begin(pair, theta, None, measured)[1], Subject.of(pair, measured, exact=exact)
+    choice, subject = choose(pair, theta, measured), Subject.of(pair, measured, exact=exact)
     calculated = [name for name in asked if BOUNDS[name].calculated]
     programs = [name for name in asked if not BOUNDS[name].calculated]
     results = {name: bound.absent(INTERRUPTED if name in asked else NOT_ASKED) for name, bound in BOUNDS.items()}

@@ -13,8 +13,8 @@ from fem1d2d.mesh import Floats
 from ndtheory.number import Numeric
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.relaxation import Rule
-from verification.algorithm.theta import begin
+from verification.algorithm.relaxation import Rule, rule_of
+from verification.algorithm.theta import choose
 from verification.contact import NoMinimiser, Solver
 from verification.interface.build import pair_of
 from verification.interface.matrices import real_array
@@ -91,10 +91,9 @@ def iterate(
     [0.0, 0.1, 0.05]
     """
     pair = pair_of(problem)
-    _, _, step = begin(pair, theta, rule)
-    T = FixedPointMap(pair, solver)
-    begun = begin_at(T, start)
-    return iterates(T, step, begun.g, begun.scale)
+    relaxation, T = rule_of(rule or pair.settings.relaxation), FixedPointMap(pair, solver)
+    choice, begun = choose(pair, theta, rule=relaxation), begin_at(T, start)
+    return iterates(T, relaxation.begin(pair, float(choice.theta), choice.rho), begun.g, begun.scale)
 
 
 def begin_at(T: FixedPointMap, given: ArrayLike | None = None) -> Start:

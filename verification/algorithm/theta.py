@@ -11,7 +11,7 @@ from ndtheory import EnergyBounds, evaluate_energy, exact
 from ndtheory.energy_norms import predicted_factor, predicted_theta
 from ndtheory.keys import Part, key
 from ndtheory.number import Numeric
-from verification.algorithm.relaxation import Rule, Step, rule_of
+from verification.algorithm.relaxation import Rule, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
 from verification.problem.specs import read_theta
@@ -83,23 +83,6 @@ def choose(
     if energy is None:
         return by_prediction(rho, measured.why_no_energy)
     return automatic(energy, pair.outside, pair.settings.tolerance)
-
-
-def begin(
-    pair: ContactPair, theta: Numeric | None = None, rule: Rule | str | None = None, measured: Measured | None = None
-) -> tuple[Rule, Choice, Step]:
-    """Return the rule and the theta of a run, as :func:`choose` has them, and the rule's steps in it.
-
-    Raises
-    ------
-    HypothesisError
-        As for :func:`choose`.
-    ValueError
-        No rule has that name.
-    """
-    relaxation = rule_of(rule or pair.settings.relaxation)
-    choice = choose(pair, theta, measured, rule=relaxation)
-    return relaxation, choice, relaxation.begin(pair, float(choice.theta), choice.rho)
 
 
 def automatic(energy: EnergyBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:

@@ -25,8 +25,7 @@ from verification.reproduce import READINGS, ModelReading, reproduce
 from verification.reproduce.claims import CLAIMS, HARD, OPTIMUM, SERVES, SOFT, Claim, Curve, zones
 from verification.reproduce.experiments import Outcome, Result, curve_of
 from verification.reproduce.refutation import COMMON, LISTED, PRINTED, Runs, judged
-from verification.sweeps.course import PAPER, meets_paper_test
-from verification.sweeps.row import FAILED, Row
+from verification.sweeps.row import FAILED, PAPER, Row, meets_paper_test
 
 #: Results are the same below this relative difference, where runs go on until this residual.
 SAME, TIGHT = 1e-8, 1e-12

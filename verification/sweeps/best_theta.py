@@ -28,7 +28,7 @@ from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.semidefinite.interior_point import LMIError
 from verification.semidefinite.multipliers import QuadraticForms
-from verification.sweeps.course import KnownPieces
+from verification.sweeps.pieces import KnownPieces
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import sweep
 
@@ -202,7 +202,7 @@ def _linearised(pair: ContactPair) -> Least:
     """The moduli of the eigenvalues ``1 - theta + theta mu`` are convex functions of theta, and so is their largest."""
     known = KnownPieces(pair)
     solution = known.solution()
-    piece = known.piece(solution.g, solution.contact.pattern)
+    piece = known.piece(solution)
     if not piece.balanced:
         raise NotLinear("contact and friction just hold the contact body: a change of g sets it in motion")
     eigenvalues = np.diagonal(piece.modes[0])

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache, partial
-from typing import Any
+from itertools import count, groupby, repeat
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d.mesh import Floats
 from ndtheory import HypothesisError
 from ndtheory.energy_norms import one_minus_square
 from ndtheory.keys import Key
 from ndtheory.texts import printable
+from verification.algorithm.arrival import NO_FORCE, arrived, coupled_residual
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
+from verification.algorithm.iterate import Iterate
+from verification.algorithm.linearisation import NotLinear, linearised_rate
+from verification.algorithm.loop import Ending, Outcome, follow
 from verification.algorithm.monolithic import SolveError
-from verification.algorithm.relaxation import Constant, Rule, rule_of
-from verification.algorithm.theta import Choice, begin
+from verification.algorithm.rates import Noise, ObservedRate, rate_of
+from verification.algorithm.relaxation import Constant, Relaxation, Rule, rule_of
+from verification.algorithm.theta import Choice, choose
 from verification.constants import Measured, measure
 from verification.contact import ContactError
 from verification.interface.interface import Law
@@ -23,7 +35,16 @@ from verification.interface.pair import ContactPair, pair_from
 from verification.machine.threads import one_thread
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.course import KnownPieces, course
+from verification.sweeps.pieces import KnownPieces, Steps, lengths
+
+#: The bound of the test of Section 6.3.
+PAPER = 1e-9
+
+#: Steps without a new least residual after which a run most likely stalls; few other runs have as many.
+WANDERS = 12
+
+#: A residual within this share of the tolerance is on either side of it by rounding: it has about seven digits there.
+TIE = 1e-6
 
 Row = dict[str, Any]
 
@@ -300,12 +321,12 @@ def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str
     found["rho"] = None if measured.rho_max is None else measured.rho_max.value
     why = {} if measured.rho_max else {"rho": measured.reason["rho_max"]}
     rule = rule_of(values.get("rule", pair.settings.relaxation))
-    chosen_rule, choice, step = begin(pair, values.get("theta"), rule, measured)
+    choice = choose(pair, values.get("theta"), measured, rule=rule)
     found |= {"theta": float(choice.theta), "rule": rule.name}
-    proved, unproved = _proved(setting, chosen_rule, choice)
+    proved, unproved = _proved(setting, rule, choice)
     found |= proved
     why |= unproved
-    columns, unmet = course(pair, chosen_rule, choice, step, setting.pieces)
+    columns, unmet = course(pair, rule, choice, setting.pieces)
     found |= columns
     return why | unmet
 
@@ -330,3 +351,182 @@ def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[
 def energy_factor(energy: tuple[float, float, float] | None, theta: float) -> float | None:
     """Return q(theta) of the theorem in energy norms, even if it is 1 or more; None without its constants."""
     return None if energy is None else math.sqrt(max(1 - one_minus_square(theta, *energy), 0.0))
+
+
+# --- how its run goes and ends ----------------------------------------------------------------------------------------
+
+
+def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
+    """Apply the test of Section 6.3, ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, to every column.
+
+    Norms are Euclidean; the second part is in the unit of force of the file.
+    """
+    increment = lengths(g - before)
+    return (increment < PAPER) | (increment < PAPER * lengths(g))
+
+
+class State(NamedTuple):
+    """One evaluation of T in a sweep, of some steps their column ``i``; ``paper`` if the test of Section 6.3 is met."""
+
+    residual: float
+    scale: float
+    paper: bool
+    steps: Steps
+    i: int
+
+    def iterate(self, T: FixedPointMap, least: float) -> Iterate:
+        """Return all values of this evaluation."""
+        return self.steps.found or iterate_at(T, self.steps.g[:, self.i], least)
+
+
+def states(batches: Iterable[Steps], least: float) -> Iterator[State]:
+    """Yield the evaluations of a run one by one; ``least`` is a scale that none falls below."""
+    before: Floats | None = None
+    for steps in batches:
+        g = steps.g
+        before = np.full((len(g), 1), math.nan) if before is None else before
+        paper = meets_paper_test(g, before if g.shape[1] == 1 else np.column_stack([before, g[:, :-1]])).tolist()
+        scales = np.maximum(steps.scale, least).tolist()
+        yield from map(State, steps.residual.tolist(), scales, paper, repeat(steps), count())
+        before = g[:, -1:]
+
+
+class Undecided(Exception):
+    """Rounding decides when a run ends: its steps must be evaluated one by one."""
+
+
+def course(pair: ContactPair, rule: Rule, choice: Choice, pieces: KnownPieces) -> tuple[dict[str, Any], dict[str, str]]:
+    """Run a pair from its start until both tests are met, or the run stalls, runs away or reaches its limit.
+
+    Returns
+    -------
+    dict
+        The columns of the run in its row, by name: ``steps``, the number until the run ended; ``iterations``, the same
+        if it converged; ``iterations_paper``, n at which the test of Section 6.3 is met; ``outcome``; the other three
+        as a run has them.
+    dict
+        Why a column is None, by its name.
+
+    Raises
+    ------
+    ContactError
+        Step II did not reach its certificate before the run ended.
+    """
+    T, step = pieces.map(), rule.begin(pair, float(choice.theta), choice.rho)
+    went = None
+    if isinstance(step, Relaxation) and not pair.held:
+        with suppress(Undecided):
+            went = _follow(pieces, pieces.steps(T, step.theta), T, lean=True)
+    if went is None:  # any rule, and where rounding decides: a residual that wanders, or meets the tolerance exactly
+        T.restart()
+        went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g, pieces.least)), T, lean=False)
+    steps, outcome, why = len(went.seen) - 1, went.outcome, went.outcome.why
+    reason = {"iterations": why.format(steps=steps)} if why else {}
+    if went.paper is None:
+        reason["iterations_paper"] = went.why or f"not met before the run ended: {outcome}"
+    observed = None if outcome is Outcome.DIVERGED else went.rate(pieces.noise)
+    if observed is None:
+        diverged = outcome is Outcome.DIVERGED
+        reason["observed_rate"] = "the run diverged" if diverged else "too few steps stand clear of the rounding"
+    end: Iterate | None = None
+    coupled, linear = None, None
+    try:
+        end = went.seen[-1].iterate(T, pieces.least)
+        coupled = coupled_residual(pair, end)
+    except ContactError as error:
+        reason["coupled_residual"] = str(error)
+    else:
+        if coupled is None:
+            reason["coupled_residual"] = NO_FORCE
+    try:
+        if not isinstance(rule, Constant):
+            raise NotLinear(f"the {rule.name} relaxation is no constant theta")
+        here, first = (end, went.entry) if end and outcome is Outcome.CONVERGED else (pieces.solution(), None)
+        linear = linearised_rate(pieces.piece(here), here, float(choice.theta), first)
+    except (NotLinear, SolveError, ContactError) as error:
+        reason["linearised_rate"] = str(error)
+    columns = {
+        "iterations": steps if outcome is Outcome.CONVERGED else None,
+        "iterations_paper": went.paper,
+        "steps": steps,
+        "outcome": outcome.value,
+        "observed_rate": None if observed is None else observed.value,
+        "linearised_rate": linear,
+        "coupled_residual": coupled,
+    }
+    return columns, reason
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Went:
+    """A run to its end.
+
+    Attributes
+    ----------
+    outcome : Outcome
+    seen : list of State
+        Every evaluation until it ended.
+    paper : int or None
+        n at which the test of Section 6.3 is met.
+    why : str
+        The error that ended it before that test was met.
+    """
+
+    outcome: Outcome
+    seen: Sequence[State]
+    paper: int | None
+    why: str
+
+    @property
+    def batches(self) -> list[Steps]:
+        """The steps that were taken together."""
+        return [steps for steps, _ in groupby(state.steps for state in self.seen)]
+
+    def rate(self, noise: Noise) -> ObservedRate | None:
+        """Return the rate at its end."""
+        g, u = (np.hstack([getattr(b, name) for b in self.batches])[:, : len(self.seen)] for name in "gu")
+        floors: list[float] = noise.of(g, u).tolist()
+        return rate_of([state.residual for state in self.seen], floors, [state.steps.piece[0] for state in self.seen])
+
+    @property
+    def entry(self) -> Floats:
+        """The g with which it came onto the piece of its last g for good."""
+        last = self.batches[-1]
+        for steps in reversed(self.batches):
+            if steps.piece != last.piece:
+                break
+            last = steps
+        return last.g[:, 0]
+
+
+def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, lean: bool) -> _Went:
+    """Follow a run to its end, and on until the test of Section 6.3 is met or the run is given up.
+
+    Raises
+    ------
+    Undecided
+        Of lean steps, which are not evaluated one by one.
+    """
+    pair, least, tolerance = pieces.pair, pieces.least, pieces.pair.settings.tolerance
+    ending, walk, seen = Ending(tolerance, pair.settings.max_iterations), states(batches, least), list[State]()
+
+    def ended(state: State) -> Outcome | None:
+        outcome = ending.at(state.residual, state.scale, lambda: arrived(pair, state.iterate(T, least)))
+        bound = tolerance * state.scale
+        if lean and (ending.since > WANDERS or abs(state.residual - bound) <= TIE * bound):
+            raise Undecided
+        return outcome
+
+    def met(state: State) -> Outcome | None:
+        return Outcome.CONVERGED if state.paper else ending.at(state.residual, state.scale, lambda: False)
+
+    outcome, why = follow(walk, ended, seen), ""
+    paper = next((n for n, state in enumerate(seen) if state.paper), None)
+    if paper is None and not ending.given_up(seen[-1].residual):
+        after = list[State]()
+        try:
+            if follow(walk, met, after) is Outcome.CONVERGED:
+                paper = len(seen) + len(after) - 1
+        except ContactError as error:
+            why = str(error)
+    return _Went(outcome=outcome, seen=seen, paper=paper, why=why)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -105,33 +105,6 @@ class Sweep(Document):
         head += [f"interrupted after {len(self.rows)} of {self.asked} rows"] * self.interrupted
         head += [] if self.problem is None else self.problem.to_toml().splitlines()
         return as_csv(head, self.columns, ([each[name] for name in self.columns] for each in self.rows))
-
-
-@dataclass(kw_only=True)
-class Tally:
-    """A count of rows as they come in: done, failed and left, with the time to go."""
-
-    asked: int
-    stored: int
-    progress: Progress
-    made: int = 0
-    failed: int = 0
-    begun: float = field(default_factory=time.monotonic)
-
-    def count(self, rows: int, failed: int) -> None:
-        """Add rows that have come in, of which ``failed`` have no run."""
-        self.made += rows
-        self.failed += failed
-        self.tell()
-
-    def tell(self) -> None:
-        """Report how far the sweep is, with the share that is done."""
-        done = self.stored + self.made
-        left = self.asked - done
-        says = f"runs: {done} done, {self.failed} failed, {left} left"
-        if self.made:
-            says += f", {duration((time.monotonic() - self.begun) * left / self.made)} to go"
-        self.progress(says, done / self.asked)
 
 
 def duration(seconds: float) -> str:
@@ -242,24 +215,33 @@ def sweep_grid(
     progress: Progress = silent,
 ) -> Sweep:
     """Run :func:`sweep` over a grid that is read already; ``work`` makes the rows, as :func:`work_of` returns it."""
-    wanted = list(grid.rows())
+    wanted, begun = list(grid.rows()), time.monotonic()
     done: dict[int, Row] = {}
+    stored = failed = 0
+
+    def tell(rows: Iterable[tuple[int, Row]]) -> None:
+        """Take in rows, and report how far the sweep is, with the share that is done."""
+        nonlocal failed
+        for place, row in rows:
+            done[place] = row
+            failed += row["outcome"] in FAILED
+        left, made = len(wanted) - len(done), len(done) - stored
+        says = f"runs: {len(done)} done, {failed} failed, {left} left"
+        if made:
+            says += f", {duration((time.monotonic() - begun) * left / made)} to go"
+        progress(says, len(done) / len(wanted))
+
     with contextlib.ExitStack() as stack:
         kept = None if store is None else stack.enter_context(Store(store, start, grid, fresh=fresh, retry=retry))
-        if kept is not None:
-            done |= kept.rows
-        stored = len(done)
-        todo = [(i, values) for i, values in enumerate(wanted) if i not in done]
-        failed = sum(row["outcome"] in FAILED for row in done.values())
-        tally = Tally(asked=len(wanted), stored=stored, failed=failed, progress=progress)
+        there = {} if kept is None else kept.rows
+        stored = len(there)
+        todo = [(i, values) for i, values in enumerate(wanted) if i not in there]
         try:
-            tally.tell()
-            made = stack.enter_context(contextlib.closing((work or work_of(1))(start, todo)))
-            for rows in made:
+            tell(there.items())
+            for rows in stack.enter_context(contextlib.closing((work or work_of(1))(start, todo))):
                 if kept is not None:
                     kept.add(rows)
-                done |= rows
-                tally.count(len(rows), sum(row["outcome"] in FAILED for _, row in rows))
+                tell(rows)
         except KeyboardInterrupt:
             if not done:
                 raise

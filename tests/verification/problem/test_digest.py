@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from stored import read
 
 import verification as vf
 from verification.certificate import claims, contraction
@@ -14,11 +15,13 @@ from verification.problem import reading, specification
 from verification.problem.specification import Problem
 from verification.problem.specs import ContactSpec, Settings
 from verification.problem.tables import non_negative
+from verification.sweeps import store
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.store import keys
+from verification.sweeps.store import keys, plan
 
 NAMES = ("section6", "two-bars", "inside", "signorini")
 GRID = SweepGrid.of({"theta": ["0.3"]})
+SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,6 +136,48 @@ def test_a_later_setting_with_a_default_changes_no_key_of_a_pair():
     pair = vf.build(vf.example("two-bars"))
     later = lambda **more: keys(replace(pair, settings=LaterSettings(**vars(pair.settings), **more)), GRID)
     assert later() == keys(pair, GRID) != later(patience=6)
+
+
+# --- releases and numerics ---
+
+TOLD = "{}: {} of these rows are of version {} with other numerics; they are not used, and stay"
+
+
+def test_rows_of_another_version_are_used(place, made, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "__version__", "0.3.0")
+        first = vf.sweep(SMALL, theta=["0.3", "0.7"], store=place)
+    del made[:]
+    found = vf.sweep(SMALL, theta=["0.3", "0.7", "0.8"], store=place)
+    assert [float(values["theta"]) for values in made] == [0.8]
+    assert (found.rows[:2], found.notes) == (first.rows, ())
+    versions = "SELECT version, count(*) FROM rows JOIN studies ON studies.id = study GROUP BY version ORDER BY 1"
+    assert read(place, versions) == [(store.__version__, 1), ("0.3.0", 2)]
+
+
+def test_rows_of_other_numerics_are_told_by_version_and_neither_used_nor_lost(place, made, monkeypatch):
+    for version, theta in (("0.3.0", ["0.3", "0.7"]), ("0.4.0", ["0.8"])):
+        with monkeypatch.context() as patch:
+            patch.setattr(store, "__version__", version)
+            vf.sweep(SMALL, theta=theta, store=place)
+    before = read(place, "SELECT * FROM rows ORDER BY key")
+    del made[:]
+    monkeypatch.setattr(store, "NUMERICS", store.NUMERICS + 2)
+    grid = {"theta": ["0.7", "0.8", "0.9"]}
+    assert plan(SMALL, SweepGrid.of(grid), place).others == {"0.3.0": 1, "0.4.0": 1}
+    found = vf.sweep(SMALL, **grid, store=place)
+    assert (len(made), found.stored) == (3, 0)
+    assert found.notes == (TOLD.format(place, 1, "0.3.0"), TOLD.format(place, 1, "0.4.0"))
+    assert set(before) < set(read(place, "SELECT * FROM rows"))
+    assert vf.sweep(SMALL, **grid, store=place).stored == 3
+
+
+def test_another_number_of_the_numerics_changes_the_key_and_another_version_does_not(monkeypatch):
+    before = keys(SMALL, GRID)
+    monkeypatch.setattr(store, "__version__", "9.9")
+    assert keys(SMALL, GRID) == before
+    monkeypatch.setattr(store, "NUMERICS", store.NUMERICS + 1)
+    assert keys(SMALL, GRID) != before
 
 
 # --- certificates ---

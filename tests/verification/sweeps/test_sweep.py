@@ -7,7 +7,6 @@ import tomllib
 import tracemalloc
 from fractions import Fraction
 from itertools import islice, pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,9 +20,9 @@ from verification.contact import ContactError, active_set
 from verification.contact.step import contact_model
 from verification.interface import body
 from verification.registry import RULES
-from verification.sweeps import course, grid, workers
+from verification.sweeps import grid, pieces, workers
 from verification.sweeps import row as of_rows
-from verification.sweeps.course import KnownPieces, Shelf
+from verification.sweeps.pieces import KnownPieces
 from verification.sweeps.row import RESULTS, SharedBodies, row
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
@@ -189,7 +188,7 @@ def test_the_count_of_the_paper_goes_on_after_the_run_has_ended():
 
 @pytest.mark.parametrize("bound", [1.2e-9, 0.8e-9])
 def test_another_bound_in_the_stopping_rule_gives_other_counts(monkeypatch, bound):
-    monkeypatch.setattr(course, "PAPER", bound)
+    monkeypatch.setattr(of_rows, "PAPER", bound)
     found = vf.sweep(SMALL, theta=[0.05, 0.1]).rows
     pair = vf.build(SMALL)
     assert [each["iterations_paper"] for each in found] != [steps_of_the_paper(pair, t, 200) for t in (0.05, 0.1)]
@@ -391,27 +390,10 @@ def test_what_sixteen_frictions_keep_at_121_contact_nodes_stays_below_100_megaby
     assert capfd.readouterr().err == ""
 
 
-def test_a_shelf_keeps_the_last_used_within_its_bytes_and_at_least_one():
-    shelf, made = Shelf(2 * 800), []
-
-    def get(key, size=100):
-        return shelf.get(key, lambda: made.append(key) or SimpleNamespace(array=np.zeros(size)))
-
-    for key in "aabacabd":
-        get(key)
-        assert shelf.nbytes <= 3 * 800
-    assert made == list("abcd")  # a was used again and again: b goes before it
-    assert get("d") is get("d")
-    get("large", 1000)
-    get("e")
-    get("large", 1000)
-    assert made[4:] == ["large", "e", "large"]
-
-
 def test_steps_on_one_affine_piece_are_taken_together(monkeypatch):
-    evaluated, original = [], course.iterate_at
-    monkeypatch.setattr(course, "iterate_at", lambda *args: evaluated.append(args) or original(*args))
-    monkeypatch.setattr(course, "iterates", None)  # which evaluates them one by one
+    evaluated, original = [], pieces.iterate_at
+    monkeypatch.setattr(pieces, "iterate_at", lambda *args: evaluated.append(args) or original(*args))
+    monkeypatch.setattr(of_rows, "iterates", None)  # which evaluates them one by one
     [found] = vf.sweep(SMALL, theta=["0.3"]).rows
     assert found["outcome"] == "converged"
     assert len(evaluated) < found["steps"] / 4

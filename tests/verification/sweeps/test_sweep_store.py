@@ -408,48 +408,6 @@ def test_what_sqlite_repeats_of_a_damaged_store_is_not_shown(place, name):
     assert str(refused.value) == f"{place}: {store.DAMAGED}"
 
 
-# --- releases and numerics ---
-
-TOLD = "{}: {} of these rows are of version {} with other numerics; they are not used, and stay"
-
-
-def test_rows_of_another_version_are_used(place, made, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr(store, "__version__", "0.3.0")
-        first = vf.sweep(SMALL, theta=["0.3", "0.7"], store=place)
-    del made[:]
-    found = vf.sweep(SMALL, theta=["0.3", "0.7", "0.8"], store=place)
-    assert [float(values["theta"]) for values in made] == [0.8]
-    assert (found.rows[:2], found.notes) == (first.rows, ())
-    versions = "SELECT version, count(*) FROM rows JOIN studies ON studies.id = study GROUP BY version ORDER BY 1"
-    assert read(place, versions) == [(store.__version__, 1), ("0.3.0", 2)]
-
-
-def test_rows_of_other_numerics_are_told_by_version_and_neither_used_nor_lost(place, made, monkeypatch):
-    for version, theta in (("0.3.0", ["0.3", "0.7"]), ("0.4.0", ["0.8"])):
-        with monkeypatch.context() as patch:
-            patch.setattr(store, "__version__", version)
-            vf.sweep(SMALL, theta=theta, store=place)
-    before = read(place, "SELECT * FROM rows ORDER BY key")
-    del made[:]
-    monkeypatch.setattr(store, "NUMERICS", store.NUMERICS + 2)
-    grid = {"theta": ["0.7", "0.8", "0.9"]}
-    assert plan(SMALL, SweepGrid.of(grid), place).others == {"0.3.0": 1, "0.4.0": 1}
-    found = vf.sweep(SMALL, **grid, store=place)
-    assert (len(made), found.stored) == (3, 0)
-    assert found.notes == (TOLD.format(place, 1, "0.3.0"), TOLD.format(place, 1, "0.4.0"))
-    assert set(before) < set(read(place, "SELECT * FROM rows"))
-    assert vf.sweep(SMALL, **grid, store=place).stored == 3
-
-
-def test_another_number_of_the_numerics_changes_the_key_and_another_version_does_not(monkeypatch):
-    before = key(SMALL)
-    monkeypatch.setattr(store, "__version__", "9.9")
-    assert key(SMALL) == before
-    monkeypatch.setattr(store, "NUMERICS", store.NUMERICS + 1)
-    assert key(SMALL) != before
-
-
 def test_the_store_says_what_its_rows_are_made_from(place):
     vf.sweep(SMALL, theta=["0.3"], store=place)
     [(version, problem)] = read(place, "SELECT version, problem FROM studies JOIN rows ON rows.study = studies.id")
