@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from ndtheory import EnergyBounds, evaluate_energy, exact
 from ndtheory.energy_norms import predicted_factor, predicted_theta
+from ndtheory.keys import Part, key
 from ndtheory.number import Numeric
 from verification.algorithm.relaxation import Rule, Step, rule_of
 from verification.constants import Measured, measure
@@ -30,35 +30,23 @@ def energy_bounds(measured: Measured) -> EnergyBounds | None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choice:
-    """The theta of a run and where it comes from.
+class Choice(Part):
+    """The theta of a run and where it comes from: ``given``, ``proved``, ``predicted``, or a rule.
 
-    Attributes
-    ----------
-    source : {'given', 'proved', 'predicted'} or str
-        The name of a rule that takes its own step for this rho, as 'momentum' does.
-    rho : float or None
-        Known where it was needed.
-    why : str
-        Why this theta, in words.
-    unused : str
-        The theta that was given to a rule which takes its own step, with its key; empty where there is none.
+    ``rho`` is known where it was needed.  ``unused`` is the theta that was given to a rule which takes its own step, as
+    momentum does, with its key; empty where there is none.
     """
 
-    theta: Fraction
-    source: str
+    theta: Fraction = key(of=float, type="number", unit="1")
+    source: str = key("`proved`, `predicted`, or the rule that takes its own step")
+    why: str = key("why this one", default="given by the problem or beside it")
     rho: float | None = None
-    why: str = "given by the problem or beside it"
     unused: str = ""
 
     @property
     def warnings(self) -> list[str]:
         """A setting that has no effect."""
         return [f"{self.unused} is not used: {self.source} takes its step from rho"] if self.unused else []
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the object ``theta_auto`` of a role."""
-        return {"theta": float(self.theta), "source": self.source, "why": self.why}
 
 
 def choose(

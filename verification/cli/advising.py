@@ -19,15 +19,15 @@ from verification.coupling.snippets import SNIPPETS
 from verification.show.layout import nothing_typed
 
 if TYPE_CHECKING:
-    from verification.coupling.roles import Advice
+    from verification.coupling.advice import Advice
     from verification.machine.progress import Progress
 
 
 def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -> Advice:
     """The advice from the options of ``advise matrices`` that were given, S1 among them, by parameter."""
     from verification.coupling.from_matrices import advise_matrices
+    from verification.coupling.from_problems import advise
     from verification.coupling.matrix_files import is_interface, names_in, read_matrix, read_vector
-    from verification.coupling.roles import advise
 
     context = click.get_current_context()
     S1, S2 = given["S1"], given.get("S2")
@@ -124,10 +124,10 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     if file.suffix in (".log", ".csv", ".dat"):
         raise click.UsageError(f"{file}: for a log type ndtheory advise run --log {file} --theta X", context)
     problem = file if file.suffix == ".npz" else load_problem(file, keys, swap=swap)
-    from verification.coupling import roles
+    from verification.coupling import from_problems
 
     with stages() as tell:
-        found = roles.advise(problem, tied=tied, progress=tell)
+        found = from_problems.advise(problem, tied=tied, progress=tell)
     _show(found, snippets, as_json, Typed(file=file, keys=keys, swap=swap))
 
 
@@ -444,14 +444,14 @@ def _no_document_of(snippets: str | None, as_json: bool) -> None:
 
 def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | None = None) -> None:
     """Show the advice, or the blocks to paste where they were asked for and a theta is advised."""
-    from verification.coupling.sections import sections
     from verification.coupling.sections import snippets as blocks
+    from verification.document import Document
 
     if snippets is not None and found.theta is not None:
         deliver(found, lambda found: blocks(found, snippets), as_json)
         if found.advised_exchanged:
             complain(f"the roles are as they are: {found.advised_exchanged}")
     else:
-        deliver(found, sections, as_json, typing=nothing_typed if typed is None else typed.command)
+        deliver(found, Document.sections, as_json, typing=nothing_typed if typed is None else typed.command)
     if snippets is not None and found.theta is None:
         complain(f"no snippet: {found.why_no_theta.partition(':')[0]}, make the run that is named")
