@@ -132,6 +132,7 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
     "laws": {"": ("interface.friction",)},
     "rules": {"": ("algorithm.relaxation",)},
     "bounds": {"": ("bounds.table", "semidefinite.bound")},
+    "log formats": {"": ("coupling.log_formats",)},
     "proofs": {"": ("certificate.proved_constants", "semidefinite.losses")},
     "documents": {
         "": (

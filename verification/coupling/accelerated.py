@@ -79,7 +79,6 @@ class Accelerated(Part):
     @property
     @means("the same in words")
     def says(self) -> str:
-        """Iterations and ends in words."""
         shown = "its residuals say nothing about rho" if self.factors is None else self.factors.says
         return f"{self.counted}; {shown}"
 

@@ -62,7 +62,6 @@ class Advice(Document):
         why=lambda advice: advice.why_no_theta,
     )
     def theta(self) -> float | None:
-        """The theta to paste, rounded down."""
         if self.why_no_theta:
             return None
         if self.next is not None:
@@ -72,7 +71,6 @@ class Advice(Document):
     @property
     @says("whether the advice is for an interface of which nothing opens or slips, as `--tied` asks")
     def tied(self) -> bool:
-        """True if the advice is for an interface where nothing opens or slips."""
         return self.evidence.kind.tied
 
     @property
@@ -82,7 +80,6 @@ class Advice(Document):
         why="no run was given",
     )
     def assumes(self) -> str | None:
-        """The assumption under which runs were read."""
         return self.evidence.assumes
 
     @property
@@ -92,7 +89,6 @@ class Advice(Document):
         why=lambda advice: advice.why_no_theta or advice.evidence.reasons["quote"],
     )
     def quote(self) -> str | None:
-        """The reason for the advice in sentences to be quoted: rho, theta, steps, method; None without a theta."""
         if self.theta is None or "quote" in self.evidence.reasons:
             return None
         best, other = self.best, self.other
@@ -143,7 +139,6 @@ class Advice(Document):
         "the run of another code whose ratio was given", null="where none was", why=_because("run", "no run was given")
     )
     def run(self) -> OneRun | None:
-        """The run that was given as its ratio."""
         return self.evidence.if_from(OneRun)
 
     @property
@@ -160,7 +155,6 @@ class Advice(Document):
         "reading that all logs leave"
     )
     def readings(self) -> tuple[RunReading, ...]:
-        """Possible meanings of the run or of the logs."""
         return self._runs.readings
 
     next: NextRun | None = key(
@@ -172,19 +166,16 @@ class Advice(Document):
     @property
     @says("the logs that were given, in their order; empty where none were")
     def logs(self) -> tuple[SeenLog, ...]:
-        """The logs of other runs as they were read."""
         return self._logs.logs
 
     @property
     @says("the logs of runs whose relaxation was not constant; `logs` has the others")
     def accelerated(self) -> tuple[Accelerated, ...]:
-        """Logs of runs whose relaxation was not constant."""
         return self._logs.accelerated
 
     @property
     @says("the bounds that follow from all logs together", null="where none were given", why="no logs were given")
     def interval(self) -> RhoInterval | None:
-        """Bounds of rho from these logs together."""
         found = self.evidence.if_from(Logs)
         return None if found is None else found.interval
 
@@ -195,7 +186,6 @@ class Advice(Document):
         why="no run with friction was given",
     )
     def friction_bounds(self) -> FrictionBounds | None:
-        """Bounds that runs prove with friction."""
         return self._runs.friction_bounds
 
     @property
@@ -205,7 +195,6 @@ class Advice(Document):
         why="no moduli were given",
     )
     def moduli(self) -> ElasticBodies | None:
-        """The moduli of two bodies, and bounds of rho from below."""
         return self.evidence.if_from(ElasticBodies)
 
     @property
@@ -215,26 +204,22 @@ class Advice(Document):
         why="neither heat nor a fluid was given",
     )
     def waves(self) -> Waves | None:
-        """Data of two plates that exchange heat, or of a fluid and a wall."""
         return self.evidence.if_from(Waves)  # type: ignore[type-abstract]
 
     @property
     @says("for parallel coupling, in each role; empty where it was not asked for")
     def parallel(self) -> tuple[Parallel, ...]:
-        """theta and factor of parallel coupling for each role, where that was asked for: then `theta` is for it."""
         possible = self.roles if self.evidence.kind.parallel else ()
         return tuple(Parallel.of(role) for role in possible if role.rho is not None)
 
     @property
     @says("findings about the given matrices or operators", null="where none were", why="no matrices were given")
     def matrices(self) -> Matrices | None:
-        """The matrices or operators that were given."""
         return self.evidence.if_from(Matrices)
 
     @property
     @says("what iterates and their images show", null="where none were given", why="no vectors were given")
     def vectors(self) -> Vectors | None:
-        """The iterates and images that were given."""
         return self.evidence.if_from(Vectors)
 
     @property
@@ -248,13 +233,11 @@ class Advice(Document):
         why=lambda advice: advice.why_no_theta or "only bounds of it are known",
     )
     def spectrum(self) -> Spectrum | None:
-        """The eigenvalues in the role that is advised; None where they are not known."""
         return self.best.spectrum if self.roles else None
 
     @property
     @says("why the theorem does not apply to the problem; empty where it does")
     def outside_theorem(self) -> tuple[str, ...]:
-        """Why the theorem does not apply to the problem."""
         return self.evidence.outside
 
     @classmethod

@@ -51,25 +51,21 @@ class Suggested(Part):
     @property
     @says("`cells` of each body: columns and rows")
     def body1(self) -> tuple[int, ...]:
-        """Of body 1."""
         return self.cells[0] if self.cells else ()
 
     @property
     @says("`cells` of each body: columns and rows")
     def body2(self) -> tuple[int, ...]:
-        """Of body 2."""
         return self.cells[1] if self.cells else ()
 
     @property
     @says("the two numbers with these cells", unit="1", type="Number")
     def rho_cells(self) -> Number | None:
-        """rho of the suggested cells."""
         return self.found.numbers.get(NAMES[False]) if self.found else None
 
     @property
     @says("the two numbers with these cells", unit="1", type="Number")
     def rho_normal_cells(self) -> Number | None:
-        """The same of normal components."""
         return self.found.numbers.get(NAMES[True]) if self.found else None
 
     def value(self, of: OfCells) -> Number:

@@ -98,13 +98,11 @@ class RunReading(Part):
     @property
     @means("the level of the arithmetic, see **Number**", name="rho.level")
     def level(self) -> str:
-        """Exact where the reading bounds rho."""
         return "float" if self.lo is None else "exact"
 
     @property
     @means("why `rho.value`, `rho.lo` or `rho.hi` is null")
     def reason(self) -> dict[str, str]:
-        """Why a number is null."""
         why = {"value": "this reading does not tell rho itself", "lo": "this reading does not bound rho"}
         reason = {f"rho.{name}": words for name, words in why.items() if getattr(self, name) is None}
         return {"rho.hi": "a run bounds rho from below at most"} | reason

@@ -128,7 +128,6 @@ class Role(Part):
         why=lambda role: role.why_not_tied,
     )
     def theta_tied(self) -> float | None:
-        """``2/(2 + rho_min + rho_tied)``."""
         return None if self.ends is None else float(tied_theta(*self.ends))
 
     @property
@@ -140,19 +139,16 @@ class Role(Part):
         why=lambda role: role.why_not_tied,
     )
     def rate_tied(self) -> float | None:
-        """``(rho_tied - rho_min)/(2 + rho_min + rho_tied)``."""
         return None if self.ends is None else float(tied_rate(*self.ends))
 
     @property
     @says(**_OF_CELLS)
     def rho_cells(self) -> Number | None:
-        """rho of the file's cells."""
         return ABSENT if self.cells is None else self.cells.of_file.numbers.get(NAMES[False])
 
     @property
     @says(**_OF_CELLS)
     def rho_normal_cells(self) -> Number | None:
-        """The same of normal components."""
         return ABSENT if self.cells is None else self.cells.of_file.numbers.get(NAMES[True])
 
     @property
@@ -166,7 +162,6 @@ class Role(Part):
         why=lambda role: role.cells.why,
     )
     def suggested(self) -> Suggested | None:
-        """Cells with a smaller rho."""
         return ABSENT if self.cells is None else self.cells if self.cells.cells else None
 
     def factor_where_tied(self, theta: float) -> float | None:

@@ -111,7 +111,6 @@ class OneRun(Runs):
     @property
     @says("over how many steps at least the ratio must be steady", name="steady_over", unit="1")
     def steps(self) -> int:
-        """Number of steps over which the ratio must be steady, at least."""
         return steps_needed(self.theta)
 
 

@@ -79,7 +79,6 @@ class SeenColumn(Part):
         unit="1",
     )
     def read(self) -> dict[str, int]:
-        """Number of windows of each kind."""
         return {kind: self.count(kind) for kind in _WORDS}
 
     def count(self, *kinds: str) -> int:
@@ -89,7 +88,6 @@ class SeenColumn(Part):
     @property
     @means("the same in words")
     def says(self) -> str:
-        """The column in words."""
         if len(self.paces) == 1:
             found = _WORDS[self.paces[0].kind]
         else:
@@ -155,7 +153,6 @@ class SeenLog(Part):
         unit="1",
     )
     def steps(self) -> int:
-        """Number of steps over which a ratio had to be steady."""
         return steps_needed(self.theta)
 
     @property
@@ -252,13 +249,11 @@ class LogBound(Part):
     @property
     @means("the log it comes from")
     def file(self) -> str:
-        """The log it comes from."""
         return self.log.file
 
     @property
     @means("that of this log", unit="1")
     def theta(self) -> float:
-        """That of this log."""
         return float(self.log.theta)
 
     says: str = key("what this log shows")

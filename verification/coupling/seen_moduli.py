@@ -49,13 +49,11 @@ class LowerBounds(Part):
     @property
     @says(**_EXCLUDED)
     def theta_excluded_stick(self) -> float | None:
-        """From this theta on no step contracts."""
         return excluded_from(self.stick)
 
     @property
     @says(**_EXCLUDED)
     def theta_excluded_slide(self) -> float | None:
-        """The same without friction."""
         return excluded_from(self.slide)
 
 
@@ -85,13 +83,11 @@ class StartTheta(Part):
     @property
     @says("$2/(2+s)$ in four figures, at most 0.99", name="theta_frictionless", unit="1")
     def theta_free(self) -> float:
-        """``2/(2 + s)``, at most 0.99: proved without friction."""
         return rounded_down(min(predicted_theta(self.s), LARGEST_TO_PASTE))
 
     @property
     @says(r"$2/(2+\rho)$ of the guess in four figures", unit="1")
     def theta_guess(self) -> float:
-        """``2/(2 + guess)``, not above `theta_free`: a guess with friction."""
         return min(rounded_down(min(predicted_theta(Fraction(self.guess)), LARGEST_TO_PASTE)), self.theta_free)
 
     def factor_free(self, theta: float) -> Number:
@@ -101,13 +97,11 @@ class StartTheta(Part):
     @property
     @says("its factor, proved without friction", type="Number", unit="1")
     def factor_frictionless(self) -> Number:
-        """The factor of `theta_free`."""
         return self.factor_free(self.theta_free)
 
     @property
     @says("the factor of that theta, proved without friction", type="Number", unit="1")
     def factor_frictionless_of_guess(self) -> Number:
-        """The factor of `theta_guess`."""
         return self.factor_free(self.theta_guess)
 
 
@@ -127,7 +121,6 @@ class ModuliRole(Part):
     @property
     @says(r"lower bounds of $\rho$ in the continuum, and nearly on fine meshes", name="bounds")
     def each(self) -> tuple[LowerBounds, ...]:
-        """All bounds."""
         return tuple(self.corners.values())
 
     def known(self, bounds: LowerBounds) -> Role:
@@ -175,19 +168,16 @@ class ElasticBodies(Evidence):
     @property
     @says("of body 1 and of body 2", type="list of exact", unit="stress")
     def young(self) -> list[Any]:
-        """E of both bodies."""
         return [written_number(body.young) for body in self.bodies]
 
     @property
     @says("of body 1 and of body 2", type="list of exact", unit="1")
     def poisson(self) -> list[Any]:
-        """nu of both bodies."""
         return [written_number(body.poisson) for body in self.bodies]
 
     @property
     @says("`strain`, `stress` or `3d`")
     def plane(self) -> str:
-        """Plane strain, plane stress, or neither."""
         return self.bodies[0].plane
 
     def spectra(self) -> tuple[Role, ...]:
@@ -251,7 +241,6 @@ class ElasticBodies(Evidence):
         why="both roles have the same bound",
     )
     def neumann_body_frictionless(self) -> BodyNumber | None:
-        """The Neumann body of the role with the smaller bound without friction."""
         return self.smaller("slide")
 
     @property

@@ -84,13 +84,11 @@ class Vectors(Evidence, Value):
     @property
     @says("estimated errors of both ends", unit="1")
     def error_low(self) -> float:
-        """Of the least end."""
         return self.spectrum.error_low
 
     @property
     @says("estimated errors of both ends", unit="1")
     def error_high(self) -> float:
-        """Of the largest end."""
         return self.spectrum.error_high
 
     symmetric: bool = key("whether the eigenvalues are real")

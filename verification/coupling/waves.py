@@ -62,7 +62,6 @@ class Waves(Evidence):
     @property
     @says("`heat` or `fluid`", name="kind")
     def exchanged(self) -> str:
-        """What is exchanged: fluxes and temperatures, or pressures and displacements."""
         return self.subject
 
     conductivity: tuple[Fraction, ...] | None = _data("of plate 1 and of plate 2, the capacity per volume")
