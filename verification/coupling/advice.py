@@ -37,7 +37,7 @@ def _because(name: str, why: str) -> Callable[[Advice], str]:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Advice(Document):
-    """What follows from evidence: :meth:`of` is the one way to it."""
+    """Roles, theta, method and next run as they follow from evidence, by :meth:`of`."""
 
     schema: ClassVar[str] = "ndtheory.advice/1"
 

@@ -46,7 +46,7 @@ class Parallel(Part):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence(Part, ABC):
-    """What is known of a coupling from one source; its keys are those of its object in the document of the advice.
+    """Knowledge of a coupling from one source; its keys make the object that the document of an advice has from it.
 
     ``kind`` is the kind of coupling.  ``friction`` is None where it is not known; ``outside`` says why the theorem does
     not apply to the problem.
@@ -115,11 +115,11 @@ class Evidence(Part, ABC):
 
     @property
     def summary(self) -> str:
-        """What is known in one line, where no theta follows."""
+        """One line where no theta follows."""
         return self.why_no_theta
 
     def words(self, body: int) -> str:
-        """What body 1 or body 2 stands for: ``body 2``, or ``bodies 2, 4`` of a file."""
+        """The bodies of the file for body 1 or body 2: ``body 2``, or ``bodies 2, 4``."""
         return f"body {body}" if self.problem is None else self.problem.words(body)
 
     def if_from(self, source: type[E]) -> E | None:

@@ -20,30 +20,14 @@ class PatternError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Form:
-    """A form of logs whose lines are searched one by one.
+    """A form of logs whose lines are searched one by one; any of its ``signs`` shows it.
 
-    Attributes
-    ----------
-    name : str
-    signs : tuple of str
-        Any of them shows that a log has this form.
-    line : pattern
-        Has some of the groups ``iteration``, ``field``, ``residual``, ``theta``, a factor, and ``omega``, one that is
-        Aitken's where it changes.
-    words : tuple of str
-        Only lines with one of them are searched; none for all lines.
-    residual, label : str
-        The kind of the residuals, and their name, with ``{}`` for the field.
-    needed : str
-        What to do for a log that has no residuals.
-    accelerator : pattern or None
-        Its first group is the name of a rule that is not constant relaxation.
-    rounded : bool
-        True if the factor is written in a figure or two, so that it may be another one.
-    every_step : bool
-        True if constant relaxation and Aitken print their factor in every iteration, and quasi-Newton does not.
-    again : bool
-        True if every iteration prints all residuals of its window once more.
+    ``line`` has some of the groups ``iteration``, ``field``, ``residual``, ``theta``, a factor, and ``omega``, one that
+    is Aitken's where it changes.  Only lines with one of the ``words`` are searched, or all.  ``label`` is the name of
+    a residual, with ``{}`` for the field; ``needed`` what to do for a log that has none; the first group of
+    ``accelerator`` the name of a rule that is not constant.  A factor is ``rounded`` if it is written in a figure or
+    two; with ``every_step`` constant relaxation and Aitken print it in every iteration and quasi-Newton does not;
+    ``again`` if every iteration prints all residuals of its window once more.
     """
 
     name: str

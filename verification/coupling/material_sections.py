@@ -30,22 +30,16 @@ def _of_moduli(seen: ElasticBodies, found: Advice) -> Sections:
     """The sections of advice from moduli."""
     each = (f"body {i}: E = {float(b.young):.5g}, nu = {float(b.poisson):.5g}" for i, b in enumerate(seen.bodies, 1))
     started = [role for role in seen.roles if role.start is not None]
-    tried = next((role for role in started if found.neumann_body in (role.neumann_body, None)), None)
-    then = ""
-    if found.next is not None:
-        theta = f"{found.next.theta:g}"
-        then = f"ndtheory advise run --theta {theta} --ratio R (R: the ratio of that run)"
-    last: Sections = ()
-    if tried is not None and tried.start is not None:
-        start = found.next.theta if found.parallel and found.next is not None else tried.start.theta_guess
-        last = (pasted(tried.neumann_body, start),)
+    first = seen.next_run()
+    last = (pasted(seen.tried.neumann_body, first.theta),) if seen.tried.start else ()
+    then = f"ndtheory advise run --theta {first.theta:g} --ratio R (R: the ratio of that run)"
     return (
         section("setting", "", Facts("", (*each, PLANES[seen.bodies[0].plane]))),
         _least_rho(seen),
         _excluded(seen),
         _who(found, seen),
         *_parallel(found, {1: "body 1", 2: "body 2"}),
-        _start(started, None if last else found.next, bool(found.parallel)),
+        _start(started, None if last else first, seen.kind.parallel),
         *last,
         closing("a bound of rho from above with friction, or where no image fits", then=then),
     )
@@ -137,7 +131,7 @@ def _of_fluid(seen: Fluid, found: Advice) -> Iterator[Section]:
     yield _bounds_of_fluid(found, seen)
     yield from _parallel(found, names)
     yield from which_method(found, names)
-    yield from next_run(found.next)
+    yield next_run(seen.next_run())
     then = f"ndtheory advise run --tied --theta {seen.next_run().theta:g} --ratio R"
     yield closing("a bound of rho from above, or anything with a viscous or compressible fluid", then=then)
 
@@ -148,7 +142,7 @@ def _setting(seen: Waves) -> Section:
 
 
 def _reads(found: Advice, names: Names, forces: str, moves: str) -> str:
-    """What each solver reads and writes."""
+    """The data that each solver reads and writes."""
     body = found.neumann_body or 2
     neumann, contact = names[body], names[3 - body]
     return f"{neumann}'s solver reads {forces} and writes {moves}, {contact}'s the reverse.".capitalize()

@@ -1,4 +1,4 @@
-"""What is known of each assignment of the roles: rho, both ends of the spectrum, the theta for them, and proofs."""
+"""The assignments of the roles as far as they are known: rho, both ends of the spectrum, theta, and proofs."""
 
 from __future__ import annotations
 

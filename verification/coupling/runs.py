@@ -40,7 +40,7 @@ OF_ONE_RUN = {
 
 @dataclass(frozen=True, kw_only=True)
 class Runs(Evidence):
-    """What runs show: possible ``readings``, bounds with friction, the ``next`` run, and ``rho`` where they decide it.
+    """Runs of one coupling: possible ``readings``, bounds with friction, the ``next`` run, ``rho`` where it is decided.
 
     Where they do ``next`` is the theta to paste.  ``rubs`` is True if there is friction.
     """

@@ -82,7 +82,7 @@ def of_a_run(run: OneRun) -> Sections:
         "For the relative residual |Tg - g|/|Tg| that coupling libraries log, use --log.",
     )
     said = section("rho", "WHAT DOES THE RUN SAY OF RHO?", *notes, _readings(run.readings))
-    return (said, *_with_friction(run.friction_bounds), *next_run(run.next))
+    return (said, *_with_friction(run.friction_bounds), next_run(run.next))
 
 
 def of_logs(found: Logs) -> Sections:
@@ -105,7 +105,7 @@ def of_logs(found: Logs) -> Sections:
         _seen(found.logs, found.accelerated),
         section("rho", "WHAT DO THEY SAY OF RHO?", *read, *notes),
         *_with_friction(found.friction_bounds),
-        *next_run(found.next),
+        next_run(found.next),
     )
 
 

@@ -230,11 +230,6 @@ def which_method(found: Advice, names: Mapping[int | None, str] | None = None) -
     yield section("method", "WHICH METHOD?", table(heads, rows), *said)
 
 
-def _some(number: int, what: str) -> str:
-    """A number of things."""
-    return f"{number} {what}{'s' * (number != 1)}"
-
-
 def few_methods(found: Advice) -> str:
     """The same in one line, where only the largest eigenvalue is known."""
     each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ' * bool(row.bound))}" for row in found.methods]
@@ -244,7 +239,8 @@ def few_methods(found: Advice) -> str:
 def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     """The eigenvalues that vectors show, and the theta for them."""
     spectrum = seen.spectrum
-    of, directions = _some(seen.unknowns, "unknown"), _some(seen.directions, "independent direction")
+    some = lambda number, what: f"{number} {what}{'s' * (number != 1)}"
+    of, directions = some(seen.unknowns, "unknown"), some(seen.directions, "independent direction")
     said = [f"{seen.iterates} iterates of {of}, {directions}"]
     kinds = ["real: the coupling looks symmetric" if seen.symmetric else "complex: the coupling is not symmetric"]
     if seen.changing and not seen.negative:
@@ -259,21 +255,23 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     yield section("given", "WHAT WAS GIVEN?", *said)
     if not found.roles:
         return
-    rows = [
-        ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
-        ("largest lambda, rho", figures(spectrum.high), figures(spectrum.error_high, 2)),
-    ]
+    largest, error = figures(spectrum.high), figures(spectrum.error_high, 2)
     if found.theta is None:
-        rows[1] = (rows[1][0], Quantity(spectrum.high, f">= {rounded(spectrum.high, 4, up=False)}"), "not found")
+        largest, error = Quantity(spectrum.high, f">= {rounded(spectrum.high, 4, up=False)}"), "not found"
         notes = [f"No theta: {found.why_no_theta}."]
         if found.method is not None:
             notes.append("With the roles exchanged theta depends on the least eigenvalue, which is found.")
-        yield section("theta", "WHICH EIGENVALUES, AND WHICH THETA?", table(("", "lambda", "error"), rows), *notes)
-        return
-    theta, rate = found.chosen(found.best)
-    formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
-    best = f"theta = {theta:.4g} = {formula}, with both errors: factor {near_one(rate)} a step"
-    notes = ["Ritz values: eigenvalues as these vectors show them, from inside; the errors are estimates.", best]
+    else:
+        theta, rate = found.chosen(found.best)
+        formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
+        notes = [
+            "Ritz values: eigenvalues as these vectors show them, from inside; the errors are estimates.",
+            f"theta = {theta:.4g} = {formula}, with both errors: factor {near_one(rate)} a step",
+        ]
+    rows = [
+        ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
+        ("largest lambda, rho", largest, error),
+    ]
     yield section("theta", "WHICH EIGENVALUES, AND WHICH THETA?", table(("", "lambda", "error"), rows), *notes)
 
 
@@ -288,19 +286,18 @@ def _at_predicted(role: Role) -> str:
 
 def _friction(found: Advice) -> Iterator[Section]:
     """The friction for which contraction is proved."""
-    if found.evidence.friction is None:
+    friction = found.evidence.friction
+    if friction is None:
         return
-    said = {}
+    said, varies = {}, found.problem is not None and found.problem.contact.varies
     for role in found.roles:
-        if role.rho is None:
-            continue
-        said[name_of(found, role.neumann_body)] = role.reason.get("friction_threshold", "")
-        if role.friction_threshold is not None:
-            allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
-            allowed += f" (here k = {figures(found.evidence.friction, 2)})"
-            if found.evidence.friction and found.problem is not None and found.problem.contact.varies:
-                share = figures(role.friction_threshold.value / found.evidence.friction)
-                allowed = f"every small theta contracts for less than {share} times the friction along Gamma_c"
+        allowed, threshold = role.reason.get("friction_threshold", ""), role.friction_threshold
+        if threshold is not None and friction and varies:
+            share = figures(threshold.value / friction)
+            allowed = f"every small theta contracts for less than {share} times the friction along Gamma_c"
+        elif threshold is not None:
+            allowed = f"every small theta contracts for k < {figures(threshold)} (here k = {figures(friction, 2)})"
+        if role.rho is not None:
             said[name_of(found, role.neumann_body)] = allowed
     if set(said.values()) == {NO_LAW}:
         return
@@ -359,9 +356,9 @@ def which_body(*notes: str) -> Section:
     return section("body", "WHICH BODY GETS THE NEUMANN PROBLEM?", *notes)
 
 
-def next_run(made: NextRun | None) -> Sections:
-    """The run to make next, if there is one."""
-    return () if made is None else (section("next", "WHICH RUN NEXT?", f"theta = {made.theta:g}: {made.why}"),)
+def next_run(made: NextRun) -> Section:
+    """The run to make next."""
+    return section("next", "WHICH RUN NEXT?", f"theta = {made.theta:g}: {made.why}")
 
 
 def pasted(

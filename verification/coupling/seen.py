@@ -131,7 +131,7 @@ def _same(one: Observed, other: Observed) -> bool:
 class SeenLog(Part):
     """One log of a run with constant theta.
 
-    ``next`` is the run to make next if this were the only log, ``rho`` that of the only reading.
+    If this were the only log ``next`` would be the run to make; ``rho`` belongs to the only reading.
     """
 
     file: str = key("the path as given")

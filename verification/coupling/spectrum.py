@@ -30,16 +30,10 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Spectrum(Value):
-    """The eigenvalues lambda of a coupling, as far as they are known.
+    """The eigenvalues lambda of a coupling by increasing real part, or those that stand for them in predictions.
 
-    Attributes
-    ----------
-    values : array, shape (m,)
-        lambda by increasing real part, no unit: all eigenvalues, or those that stand for them in predictions.
-    source : {'eigenvalues', 'ends', 'vectors'}
-        Whether they are all eigenvalues, lie between two known ends, or are Ritz values of vectors.
-    error_low, error_high : float
-        Estimated errors of both ends; 0 where they are known.
+    They are all eigenvalues, lie between two known ends, or are Ritz values of vectors; errors of both ends are
+    estimated, and 0 where these are known.
     """
 
     values: Complex

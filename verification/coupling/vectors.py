@@ -1,4 +1,4 @@
-"""What a few iterates and their images show of the eigenvalues of a coupling."""
+"""Eigenvalues of a coupling by a few iterates and their images."""
 
 from __future__ import annotations
 

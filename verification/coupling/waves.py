@@ -75,7 +75,7 @@ class Waves(Evidence):
 
     @cached_property
     def given(self) -> dict[str, tuple[Fraction, ...]]:
-        """What was given, by parameter."""
+        """The numbers that were given, by parameter."""
         return {name: numbers for name in PARAMETERS if (numbers := getattr(self, name)) is not None}
 
     def one(self, name: str) -> Fraction | None:
