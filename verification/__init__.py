@@ -43,15 +43,15 @@ if TYPE_CHECKING:
     from verification.constants.measured import Measured as Measured
     from verification.constants.measuring import measure as measure
     from verification.contact import ContactError as ContactError
+    from verification.coupling.advice import Advice as Advice
     from verification.coupling.driver import Coupling as Coupling
     from verification.coupling.driver import couple as couple
     from verification.coupling.from_logs import advise_logs as advise_logs
     from verification.coupling.from_matrices import advise_matrices as advise_matrices
     from verification.coupling.from_moduli import advise_moduli as advise_moduli
+    from verification.coupling.from_problems import advise as advise
     from verification.coupling.from_runs import advise_run as advise_run
     from verification.coupling.from_vectors import advise_vectors as advise_vectors
-    from verification.coupling.roles import Advice as Advice
-    from verification.coupling.roles import advise as advise
     from verification.exploration.page import Exploration as Exploration
     from verification.exploration.page import explore as explore
     from verification.interface.build import build as build
@@ -69,7 +69,7 @@ if TYPE_CHECKING:
 
 #: The module of each public name.  No module at this level has the name of a public function: it would hide it.
 _HOME = {
-    "Advice": "coupling.roles",
+    "Advice": "coupling.advice",
     "Comparison": "comparison",
     "ContactError": "contact",
     "ContactPair": "interface.pair",
@@ -87,7 +87,7 @@ _HOME = {
     "SolveError": "algorithm.monolithic",
     "Sweep": "sweeps.sweep",
     "Iterate": "algorithm.iterate",
-    "advise": "coupling.roles",
+    "advise": "coupling.from_problems",
     "advise_logs": "coupling.from_logs",
     "advise_matrices": "coupling.from_matrices",
     "advise_moduli": "coupling.from_moduli",
@@ -132,6 +132,7 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
     "laws": {"": ("interface.friction",)},
     "rules": {"": ("algorithm.relaxation",)},
     "bounds": {"": ("bounds.table", "semidefinite.bound")},
+    "log formats": {"": ("coupling.log_formats",)},
     "proofs": {"": ("certificate.proved_constants", "semidefinite.losses")},
     "documents": {
         "": (
@@ -145,7 +146,7 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
             "cli.problems",
             "comparison",
             "constants.measured",
-            "coupling.roles",
+            "coupling.advice",
             "exploration.page",
             "ledger.rows",
             "reproduce.experiments",
@@ -163,7 +164,7 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
         "certificate.contraction": ("certificate.sections",),
         "comparison": ("sections.comparison",),
         "constants.measured": ("sections.constants",),
-        "coupling.roles": ("coupling.sections",),
+        "coupling.advice": ("coupling.sections", "coupling.runs_sections", "coupling.material_sections"),
         "exploration.page": ("exploration.sections",),
         "ledger.rows": ("ledger.sections",),
         "reproduce.experiments": ("reproduce.sections",),
@@ -178,7 +179,7 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
         "bounds.table": ("figures.squares",),
         "comparison": ("figures.residuals",),
         "constants.measured": ("figures.factor",),
-        "coupling.roles": ("figures.factor",),
+        "coupling.advice": ("figures.factor",),
         "reproduce.experiments": ("figures.reproduction",),
         "sweeps.region": ("figures.region",),
         "sweeps.sweep": ("figures.sweep",),

@@ -1,4 +1,5 @@
-"""Tables that lower modules look into and upper modules fill: laws, rules and bounds by name, what shows a result.
+"""Tables that lower modules look into and upper modules fill: laws, rules, bounds, forms of logs,
+what shows a result.
 
 An entry may be added at any time: whoever loops over a table reads it then.  Entries have the types that their own
 modules check.
@@ -67,6 +68,9 @@ class Registry(MutableMapping[str, V]):
 #: The laws of friction and the relaxation rules that a problem file may name.
 LAWS: Registry[Any] = Registry("laws")
 RULES: Registry[Any] = Registry("rules")
+
+#: The forms of logs of other codes, by the lines that they print.
+LOG_FORMATS: Registry[Any] = Registry("log formats")
 
 #: The bounds, from the weakest to the strongest: all are worked out, judged, shown and drawn.
 BOUNDS: Registry[Any] = Registry("bounds")

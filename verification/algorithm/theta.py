@@ -39,8 +39,8 @@ class Choice(Part):
 
     theta: Fraction = key("relaxation factor", of=float, type="number")
     source: str = key("`given`, `proved`, `predicted`, or the rule that takes its own step")
-    rho: float | None = None
     why: str = key("why this one", default="given by the problem or beside it")
+    rho: float | None = None
     unused: str = ""
 
     @property

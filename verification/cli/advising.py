@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,15 +20,15 @@ from verification.coupling.snippets import SNIPPETS
 from verification.show.layout import nothing_typed
 
 if TYPE_CHECKING:
-    from verification.coupling.roles import Advice
+    from verification.coupling.advice import Advice
     from verification.machine.progress import Progress
 
 
 def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -> Advice:
     """The advice from the options of ``advise matrices`` that were given, S1 among them, by parameter."""
     from verification.coupling.from_matrices import advise_matrices
+    from verification.coupling.from_problems import advise
     from verification.coupling.matrix_files import is_interface, names_in, read_matrix, read_vector
-    from verification.coupling.roles import advise
 
     context = click.get_current_context()
     S1, S2 = given["S1"], given.get("S2")
@@ -51,7 +52,8 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
             values[name] = read(given[name], "P" if name == "transfer" else name)
     if "transfer" in given and "friction" in given:
         values |= _grids(given["transfer"], given)
-    values |= {name: given[name] for name in ("radius", "friction") if name in given}
+    values |= {"friction": given["friction"]} if "friction" in given else {}
+    values |= {"radius": float(exact(given["radius"]))} if "radius" in given else {}
     if "neumann_body" in given:
         values["neumann_body"] = int(given["neumann_body"])
     files = ", ".join(dict.fromkeys(str(value) for value in given.values() if isinstance(value, Path)))
@@ -124,31 +126,26 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     if file.suffix in (".log", ".csv", ".dat"):
         raise click.UsageError(f"{file}: for a log type ndtheory advise run --log {file} --theta X", context)
     problem = file if file.suffix == ".npz" else load_problem(file, keys, swap=swap)
-    from verification.coupling import roles
+    from verification.coupling import from_problems
 
     with stages() as tell:
-        found = roles.advise(problem, tied=tied, progress=tell)
+        found = from_problems.advise(problem, tied=tied, progress=tell)
     _show(found, snippets, as_json, Typed(file=file, keys=keys, swap=swap))
 
 
-def _friction(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    try:
-        fits = value is None or exact(value) >= 0
-    except ValueError:
-        fits = False
-    if not fits:
-        raise click.UsageError(f"--friction = {value}: needed a number >= 0, as --friction 0.2", context)
-    return value
+def _number(needed: str, fits: Callable[[Fraction], bool]) -> Callable[..., str | None]:
+    """A callback that refuses what is not such a number."""
 
+    def read(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+        try:
+            good = value is None or fits(exact(value))
+        except (ValueError, OverflowError):
+            good = False
+        if not good:
+            raise click.UsageError(f"--{parameter.name} = {value}: needed {needed}", context)
+        return value
 
-def _radius(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
-    try:
-        radius = None if value is None else float(exact(value))
-    except (ValueError, OverflowError):
-        radius = 0.0
-    if radius is not None and not 0 < radius < float("inf"):
-        raise click.UsageError(f"--radius = {value}: needed a number > 0", context)
-    return radius
+    return read
 
 
 def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callable[[F], F]:
@@ -167,11 +164,16 @@ def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callabl
 @click.option(
     "--friction",
     metavar="K",
-    callback=_friction,
+    callback=_number("a number >= 0, as --friction 0.2", lambda k: k >= 0),
     help="Friction k >= 0, with --x and --radius, or with --kernel and --weights or --x.",
 )
 @_matrix("--x", "x", "Positions of the nodes of the contact body, increasing.")
-@click.option("--radius", metavar="LENGTH", callback=_radius, help="Radius of the hat kernel, in the unit of --x.")
+@click.option(
+    "--radius",
+    metavar="LENGTH",
+    callback=_number("a number > 0", lambda radius: float(radius) > 0),
+    help="Radius of the hat kernel, in the unit of --x.",
+)
 @_matrix("--kernel", "kernel", "Operator S of the law of friction: normal nodal forces to stress at these nodes.")
 @_matrix("--weights", "weights", "Weights of the quadrature on these nodes; by default those of the trapezoid rule.")
 @SNIPPETS_OF
@@ -445,14 +447,14 @@ def _no_document_of(snippets: str | None, as_json: bool) -> None:
 
 def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | None = None) -> None:
     """Show the advice, or the blocks to paste where they were asked for and a theta is advised."""
-    from verification.coupling.sections import sections
     from verification.coupling.sections import snippets as blocks
+    from verification.document import Document
 
     if snippets is not None and found.theta is not None:
         deliver(found, lambda found: blocks(found, snippets), as_json)
         if found.advised_exchanged:
             complain(f"the roles are as they are: {found.advised_exchanged}")
     else:
-        deliver(found, sections, as_json, typing=nothing_typed if typed is None else typed.command)
+        deliver(found, Document.sections, as_json, typing=nothing_typed if typed is None else typed.command)
     if snippets is not None and found.theta is None:
         complain(f"no snippet: {found.why_no_theta.partition(':')[0]}, make the run that is named")

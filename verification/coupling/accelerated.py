@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
+from ndtheory.keys import Part, key
+from ndtheory.keys import says as means
 from verification.coupling.log_files import Log
 from verification.coupling.readings import LARGEST_TO_PASTE, SHOWS_MOST, NextRun, few, rounded_down
 from verification.coupling.spectrum import MARGIN, Spectrum
-from verification.value import to_plain
 
 #: A factor counts as long as the residual is above this share of the largest: the solvers' own accuracy is below it.
 NOISE = 1e-8
@@ -32,28 +32,21 @@ FALLEN, ENOUGH = 1e-2, 6
 BELOW = 0.05
 
 
+_ENDS = r"the least and the largest eigenvalue $\lambda$ that they show: estimates from inside the spectrum"
+_USED = "factors from which the ends are read, above the noise of the solvers, and all of them"
+_COUNTS = "time windows in the log, and the median of their iterations"
+
+
 @dataclass(frozen=True, kw_only=True)
-class SeenFactors:
-    """Ends of the spectrum by Aitken's factors.
+class SeenFactors(Part):
+    """Ends of the spectrum by Aitken's factors."""
 
-    Attributes
-    ----------
-    used, given : int
-        Number of factors from which the ends are read, and of all.
-    low, high : float
-        The least and the largest lambda that they show: estimates from inside the spectrum.
-    fastest_fall : float
-        The last residual over the largest one, in the window where that is least.
-    doubt : str
-        Why no theta follows from them; empty where one does.
-    """
-
-    used: int
-    given: int
-    low: float
-    high: float
-    fastest_fall: float
-    doubt: str
+    used: int = key(_USED, unit="1")
+    given: int = key(_USED, unit="1")
+    low: float = key(_ENDS, unit="1")
+    high: float = key(_ENDS, unit="1")
+    fastest_fall: float = key("the last residual over the largest, in the window where that is least", unit="1")
+    doubt: str = key("why no theta follows from them; empty where one does")
 
     @property
     def says(self) -> str:
@@ -61,33 +54,22 @@ class SeenFactors:
         ends = f"factors, {self.used} of {self.given}: lambda from {few(self.low)} to {few(self.high)}"
         return f"{ends} or beyond, estimates{'; ' * bool(self.doubt)}{self.doubt}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``accelerated.factors``."""
-        return vars(self)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Accelerated:
-    """A log of a run with Aitken, quasi-Newton or another rule that is not constant relaxation.
+class Accelerated(Part):
+    """A log of a run with Aitken, quasi-Newton or another rule that is not constant relaxation."""
 
-    Attributes
-    ----------
-    file, form, accelerator : str
-        The accelerator as the log names it.
-    windows, iterations : int
-        Number of time windows, and the median of their iterations.
-    factors : SeenFactors or None
-        None where the log prints no Aitken factors.
-    notes : tuple of str
-    """
-
-    file: str
-    form: str
-    accelerator: str
-    windows: int
-    iterations: int
-    factors: SeenFactors | None
-    notes: tuple[str, ...]
+    file: str = key("as in `logs`")
+    form: str = key("as in `logs`")
+    accelerator: str = key("the rule, as the log names it")
+    windows: int = key(_COUNTS, unit="1")
+    iterations: int = key(_COUNTS, unit="1")
+    factors: SeenFactors | None = key(
+        "what Aitken's factors show of the spectrum",
+        null="where the log prints none",
+        why="the log prints no Aitken factor for each iteration",
+    )
+    notes: tuple[str, ...] = key("lines that were left out")
 
     @property
     def counted(self) -> str:
@@ -95,17 +77,10 @@ class Accelerated:
         return f"{self.iterations} iterations" + f", the median of {self.windows} windows" * (self.windows > 1)
 
     @property
+    @means("the same in words")
     def says(self) -> str:
-        """Iterations and ends in words."""
         shown = "its residuals say nothing about rho" if self.factors is None else self.factors.says
         return f"{self.counted}; {shown}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``accelerated``."""
-        reason = {} if self.factors is not None else {"factors": "the log prints no Aitken factor for each iteration"}
-        names = ("file", "form", "accelerator", "windows", "iterations", "factors", "says")
-        plain = {name: to_plain(getattr(self, name)) for name in names}
-        return {**plain, "notes": list(self.notes), "reason": reason}
 
 
 def seen_accelerated(log: Log) -> Accelerated:

@@ -10,9 +10,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 from ndtheory import Number
+from ndtheory.keys import Part, says
 from verification.constants.cells import NAMES, OfCells, rho_of_cells
 from verification.problem import Problem
 
@@ -33,21 +33,12 @@ Counts = tuple[int, int]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Suggested:
-    """Cells for both bodies, and rho of them; or why none are suggested.
+class Suggested(Part):
+    """Cells for both bodies, columns and rows of each, and rho of them; or why none are suggested.
 
-    Attributes
-    ----------
-    cells : pair of pair of int, or None
-        Columns and rows of body 1 and of body 2.
-    of_file, found : OfCells
-        ``rho_cells`` and ``rho_normal_cells`` of the file's cells and of the suggested ones, in the file's roles.
-    normal : bool
-        True if ``rho_normal_cells`` decides.
-    poisson : Fraction
-        The larger nu of both bodies, of plane strain with the same law in the plane.
-    why : str
-        Why there are none.
+    ``of_file`` and ``found`` have rho of the file's cells and of the suggested ones in the file's roles, of which the
+    normal one decides if ``normal``.  ``poisson`` is the larger nu of both bodies, of plane strain with the same law in
+    the plane.
     """
 
     of_file: OfCells
@@ -57,13 +48,25 @@ class Suggested:
     found: OfCells | None = None
     why: str = ""
 
-    def entries(self) -> tuple[dict[str, Any], dict[str, str]]:
-        """``rho_cells``, ``rho_normal_cells`` and ``cells`` of a role's document, and why they are null."""
-        numbers, reason = self.of_file.objects()
-        if self.cells is None or self.found is None:
-            return numbers | {"cells": None}, reason | {"cells": self.why}
-        cells = {"body1": list(self.cells[0]), "body2": list(self.cells[1])}
-        return numbers | {"cells": cells | self.found.objects()[0]}, reason
+    @property
+    @says("`cells` of each body: columns and rows")
+    def body1(self) -> tuple[int, ...]:
+        return self.cells[0] if self.cells else ()
+
+    @property
+    @says("`cells` of each body: columns and rows")
+    def body2(self) -> tuple[int, ...]:
+        return self.cells[1] if self.cells else ()
+
+    @property
+    @says("the two numbers with these cells", unit="1", type="Number")
+    def rho_cells(self) -> Number | None:
+        return self.found.numbers.get(NAMES[False]) if self.found else None
+
+    @property
+    @says("the two numbers with these cells", unit="1", type="Number")
+    def rho_normal_cells(self) -> Number | None:
+        return self.found.numbers.get(NAMES[True]) if self.found else None
 
     def value(self, of: OfCells) -> Number:
         """The one of the two numbers that decides."""

@@ -16,9 +16,9 @@ from fem1d2d.mesh import Floats
 from ndtheory.constants import take
 from verification.algorithm.loop import Ending, Evaluation, Outcome, evaluations, follow
 from verification.algorithm.relaxation import Rule, rule_of
-from verification.coupling.from_vectors import advice_of
-from verification.coupling.roles import Advice
-from verification.coupling.spectrum import Spectrum, seen_in
+from verification.coupling.advice import Advice
+from verification.coupling.spectrum import Spectrum
+from verification.coupling.vectors import seen_in
 from verification.interface.matrices import real_array
 from verification.value import Value
 
@@ -111,7 +111,7 @@ class Coupling:
         if self._advice is None and len(self._seen) > 1:
             X, TX, starts = map(np.array, zip(*self._seen, strict=True))
             try:
-                self._advice = advice_of(seen_in(X, TX, starts=starts))
+                self._advice = Advice.of(seen_in(X, TX, starts=starts))
             except ValueError:  # they do not differ above rounding
                 return None
         return self._advice

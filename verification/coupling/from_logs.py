@@ -15,9 +15,9 @@ from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.number import below
 from verification.coupling import ends
 from verification.coupling.accelerated import after_accelerated, seen_accelerated, spectrum_of
+from verification.coupling.advice import Advice
 from verification.coupling.ends import DEAR, SETTLED, Box
-from verification.coupling.from_runs import advice_of_runs
-from verification.coupling.from_vectors import advice_on
+from verification.coupling.kinds import kind_of
 from verification.coupling.log_files import Log, read_log
 from verification.coupling.pace import CONVERGED, RELATIVE, Pace
 from verification.coupling.readings import (
@@ -36,11 +36,9 @@ from verification.coupling.readings import (
     rounded_down,
     steps_needed,
 )
-from verification.coupling.roles import Advice
+from verification.coupling.runs import Logs, decided
 from verification.coupling.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
 from verification.coupling.seen import AGREE, LogBound, RhoInterval, SeenColumn, SeenLog, bounds, seen_column
-from verification.coupling.spectrum import Spectrum
-from verification.interface.pair import UNITS
 from verification.problem.tables import ProblemError
 
 #: Readings that are left, the run to make next, and rho where the logs decide it.
@@ -135,42 +133,25 @@ def advise_logs(
     given = [(Path(path), number(theta)) for path, theta in logs]
     if not given:
         raise ValueError("needed one log or more")
-    assumes = assumed(tied, friction)
+    assumed(tied, friction)  # one of both at most
     read = [(read_log(path, pattern), theta) for path, theta in given]
     accelerated = tuple(seen_accelerated(log) for log, _ in read if log.accelerator is not None)
     seen = tuple(seen_log(log, _theta_of(log, theta), friction) for log, theta in read if log.accelerator is None)
-    spectrum = spectrum_of(accelerated)
-    known: dict[str, Any] = {"assumes": assumes, "accelerated": accelerated}
+    spectrum, made = spectrum_of(accelerated), [log.made for log in seen]
+    known: dict[str, Any] = {"kind": kind_of(tied=tied), "rubs": friction, "accelerated": accelerated, "logs": seen}
     if not seen:
-        known |= {"interval": interval_of([], []), "next": after_accelerated(spectrum, tied)}
-        return _of_factors(spectrum if tied else None, tied=tied, **known)
+        known |= {"spectrum": spectrum if tied else None, "interval": interval_of([], [])}
+        return Advice.of(Logs(readings=(), rho=None, next=after_accelerated(spectrum, tied), **known))
     interval = interval_of(*(([], []) if friction else bounds(seen)))
     readings, following, rho = with_friction(seen) if friction else decide(seen, interval, tied)
-    found = advice_of_runs(
-        [log.made for log in seen],
-        readings,
-        following,
-        rho,
-        tied=tied,
-        friction_bounds=friction_bounds(*by_kind(seen)) if friction else None,
-        logs=seen,
-        interval=interval,
-        **known,
+    with_it = friction_bounds(*by_kind(seen)) if friction else None
+    found = Logs(
+        **decided(made, readings, following, rho, tied=tied, friction_bounds=with_it), interval=interval, **known
     )
-    if found.roles or not tied or spectrum is None or interval.contradiction is not None:
-        return found
-    paste = pasted_or_not(after_accelerated(spectrum, tied), [log.made for log in seen])
-    if paste is None:
-        return found
-    known |= {"logs": seen, "readings": found.readings, "interval": interval, "next": paste}
-    return _of_factors(spectrum, tied=tied, **known)
-
-
-def _of_factors(spectrum: Spectrum | None, *, tied: bool, **known: Any) -> Advice:
-    """The advice on what Aitken's factors show; only a run to make where that is None."""
-    if spectrum is None:
-        return Advice(neumann_body=None, roles=(), units=UNITS, tied=tied, **known)
-    return advice_on(spectrum, tied=tied, of="Aitken's factors", **known)
+    if found.rho is None and tied and spectrum is not None and interval.contradiction is None:
+        paste = pasted_or_not(after_accelerated(spectrum, tied), made)
+        found = found if paste is None else replace(found, spectrum=spectrum, next=paste)
+    return Advice.of(found)
 
 
 def _theta_of(log: Log, theta: Fraction | None) -> Fraction:

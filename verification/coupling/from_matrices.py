@@ -14,14 +14,16 @@ from scipy.sparse.linalg import LinearOperator
 from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
-from verification.coupling.kinds import BodyNumber
-from verification.coupling.roles import ALL, Advice, Role, advise, plain_role, role_on, with_both_ends
+from verification.coupling.advice import Advice
+from verification.coupling.from_problems import ALL, of_problem
+from verification.coupling.kinds import BodyNumber, kind_of
+from verification.coupling.roles import Role, plain_role, role_on, with_both_ends
 from verification.coupling.sides import (
     BODIES,
     ORDERING,
     TOLD,
+    Matrices,
     SeenLanczos,
-    SeenMatrices,
     Side,
     Transfer,
     is_operator,
@@ -35,7 +37,7 @@ from verification.coupling.spectrum import Spectrum
 from verification.interface.build import build
 from verification.interface.friction import Nonlocal, hat
 from verification.interface.matrices import ASYMMETRY, real_array, size
-from verification.interface.pair import UNITS
+from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
 
@@ -160,26 +162,33 @@ def advise_matrices(
             if functions and body not in refused:
                 roles[body], seen = _by_lanczos(body, sides, P, progress)
                 lanczos.append(seen)
-        both = [(refused | roles)[body] for body in BODIES]
+        both = tuple((refused | roles)[body] for body in BODIES)
         symmetric = all(side.seen.asymmetry is None or side.seen.asymmetry <= TOLD for side in sides.values())
         if not functions and P is None and not refused and symmetric:
-            both = list(with_both_ends(both))
-        found = Advice.between(both, tied=tied, units=UNITS)
+            both = with_both_ends(both)
+        known: dict[str, Any] = {"kind": kind_of(tied=tied)}
     else:
-        found = _with_friction(sides, P, 1 if 2 in refused else 2, friction, beside, tied)
-        found = replace(found, roles=tuple(refused.get(role.neumann_body or 2, role) for role in found.roles))
-    notes = [note for body in (1, 2) for note in sides[body].seen.notes(f"S{body}", ASYMMETRY)]
+        pair = _with_friction(sides, P, 1 if 2 in refused else 2, friction, beside)
+        of_pair = of_problem(pair, tied=tied)
+        known = {name: getattr(of_pair, name) for name in ("kind", "friction", "outside")}
+        # without a problem file "auto" has no meaning
+        both = tuple(refused.get(role.neumann_body or 2, replace(role, theta_auto=None)) for role in of_pair.spectra())
     ordered = friction is not None or (P is not None and P.components > 1)
-    matrices = SeenMatrices(
+    matrices = Matrices(
+        roles=both,
         S1=sides[1].seen,
         S2=sides[2].seen,
         transfer=None if P is None else (int(P.P.shape[0]), int(P.P.shape[1])),
         neumann_body=None if P is None else P.neumann_body,
         ordering=ORDERING if ordered else None,
         lanczos=tuple(lanczos),
-        notes=(*notes, *([] if P is None else P.notes)),
+        notes=tuple(
+            [note for body in (1, 2) for note in sides[body].seen.notes(f"S{body}", ASYMMETRY)]
+            + ([] if P is None else P.notes)
+        ),
+        **known,
     )
-    return replace(found, matrices=matrices)
+    return Advice.of(matrices)
 
 
 def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[BodyNumber, Role]:
@@ -270,8 +279,8 @@ def _by_lanczos(body: BodyNumber, sides: Sides, P: Transfer | None, progress: Pr
 
 
 def _with_friction(
-    sides: Sides, P: Transfer | None, neumann_body: BodyNumber, friction: Any, beside: dict[str, Any], tied: bool
-) -> Advice:
+    sides: Sides, P: Transfer | None, neumann_body: BodyNumber, friction: Any, beside: dict[str, Any]
+) -> ContactPair:
     x, x_neumann, weights, radius, kernel = beside.values()
     one, two = (side.matrix for side in (sides[1], sides[2]))
     assert one is not None
@@ -297,7 +306,7 @@ def _with_friction(
         Nonlocal(radius=radius)  # refuses a number that cannot be a radius
         x_n = real_array("x_neumann", x_neumann, (matrix.shape[1],))
         kernel = hat(real_array("x", x, (n,))[:, None] - x_n[None, :], radius)
-    pair = build(
+    return build(
         S1=one.matrix,
         S2=two.matrix,
         x=positions,
@@ -308,8 +317,6 @@ def _with_friction(
         friction=friction,
         neumann_body=neumann_body,
     )
-    found = advise(pair, tied=tied)  # without a problem file "auto" has no meaning
-    return replace(found, roles=tuple(replace(role, theta_auto=None) for role in found.roles))
 
 
 def _of_nodes(P: Transfer, n: int) -> Floats:

@@ -9,32 +9,15 @@ from typing import Any, get_args
 
 from ndtheory import HypothesisError, Number
 from ndtheory.constants import take
-from ndtheory.energy_norms import parallel_theta, predicted_rate, predicted_theta
 from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
 from ndtheory.number import below
-from verification.coupling.from_waves import advise_waves, shown
-from verification.coupling.kinds import BodyNumber
-from verification.coupling.readings import NextRun, or_at_one, rounded_down
-from verification.coupling.roles import PROVED, Advice, Role
-from verification.coupling.seen_moduli import (
-    Corners,
-    LowerBounds,
-    ModuliRole,
-    Parallel,
-    SeenModuli,
-    StartTheta,
-    exactly,
-)
-from verification.interface.pair import UNITS
+from verification.coupling.advice import Advice
+from verification.coupling.kinds import BodyNumber, kind_of
+from verification.coupling.seen_moduli import Corners, ElasticBodies, LowerBounds, ModuliRole, StartTheta
+from verification.coupling.waves import Fluid, Heat, read_waves, shown
 
 #: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.
 LARGEST_YOUNG, CLOSEST = 10**24, Fraction(1, 10**12)
-
-#: Reason for a missing friction threshold beside the values that are proved for k = 0.
-NO_FRICTION = "a mirror image proves nothing of friction: the proved values are for k = 0"
-
-#: Reason for a missing theta for a tied interface.
-ONE_END = "moduli bound rho from below, and no other end of the spectrum"
 
 
 def advise_moduli(
@@ -123,7 +106,7 @@ def advise_moduli(
         elastic = {"plane": plane != "strain" and plane, "corners": corners, "mirror": [*mirror], "flat": flat}
         given |= {key: value for key, value in elastic.items() if value}
         given |= {key: value for key, value in (("young", young), ("poisson", poisson)) if value is not None}
-        return advise_waves("fluid" if conductivity is None else "heat", given, parallel=parallel)
+        return Advice.of(read_waves(Fluid if conductivity is None else Heat, given, parallel=parallel))
     for key, value in given.items():
         raise HypothesisError(key, shown(value), f"no {key} beside young: it belongs to conductivity or density")
     bodies = _bodies(young, poisson, plane)
@@ -140,19 +123,8 @@ def advise_moduli(
     if flat and not fits:
         raise HypothesisError("flat", flat, "a mirror image that fits (mirror)")
     roles = _role(1, bodies, corners, fits, flat), _role(2, bodies, corners, fits, flat)
-    seen = SeenModuli(bodies=bodies, corners=corners, mirror=fits, flat=flat, roles=roles)
-    tried = seen.smaller("stick") or seen.smaller("slide")
-    if tried is None:  # no difference but what is proved of one of them
-        started = [role.neumann_body for role in roles if role.start is not None]
-        tried = started[0] if len(started) == 1 else None
-    return Advice(
-        neumann_body=tried,
-        roles=tuple(_as_role(role, seen.bounds(role)) for role in roles),
-        units=UNITS,
-        next=_next(seen, tried, parallel),
-        moduli=seen,
-        parallel=tuple(Parallel.of(r.neumann_body, seen.bounds(r).stick.value, bound=True) for r in roles * parallel),
-    )
+    kind = kind_of(tied=False, parallel=parallel)
+    return Advice.of(ElasticBodies(kind=kind, bodies=bodies, corners=corners, mirror=fits, flat=flat, roles=roles))
 
 
 def _bodies(young: Sequence[Any], poisson: Sequence[Any], plane: Plane) -> tuple[Moduli, Moduli]:
@@ -183,7 +155,7 @@ def _role(
     for name in get_args(Corners):
         openings = _opening(contact_body, name), _opening(neumann_body, name)
         stick, slide = end(contact, neumann, openings)[1], free_end(contact, neumann, openings)
-        bounds[name] = LowerBounds(stick=_larger(patch.high, stick), slide=_larger(patch.free, slide))
+        bounds[name] = LowerBounds(corners=name, stick=_larger(patch.high, stick), slide=_larger(patch.free, slide))
     if contact_body not in fits or s is None:
         why = (
             f"body {contact_body} is incompressible and body {neumann_body} is not: no multiple of its energy is enough"
@@ -211,50 +183,3 @@ def _larger(exact: Fraction, computed: float) -> Number:
         return Number.of_float(computed)
     bound = below(exact)
     return Number(value=bound, lo=bound, level="exact")
-
-
-def _as_role(role: ModuliRole, bounds: LowerBounds) -> Role:
-    """The role with its bound of rho, and what is proved of it without friction."""
-    reason = {
-        "theta_predicted": "moduli bound rho from below, which predicts no theta",
-        "rate_predicted": "moduli bound rho from below, which predicts no rate",
-        "friction_threshold": NO_FRICTION if role.start else "moduli say nothing about friction",
-        "rho_min": ONE_END,
-    }
-    if role.start is None:
-        reason |= dict.fromkeys(PROVED, role.why_no_start)
-        return Role(neumann_body=role.neumann_body, rho=bounds.stick, reason=reason)
-    s = role.start.s
-    return Role(
-        neumann_body=role.neumann_body,
-        rho=bounds.stick,
-        theta_proved=float(predicted_theta(s)),
-        factor_proved=exactly(predicted_rate(s)),
-        theta_max_proved=exactly(min(2 / (1 + s), Fraction(1))),
-        reason=reason,
-    )
-
-
-def _next(seen: SeenModuli, tried: BodyNumber | None, parallel: bool) -> NextRun:
-    """The theta to start with in the role that is tried, or the run to make."""
-    role = seen.roles[0 if tried is None else tried - 1]
-    if role.start is not None and parallel:
-        theta = min(parallel_theta(Fraction(role.start.guess)), Fraction(role.start.theta_guess))
-        return NextRun(
-            theta=rounded_down(theta), why="a guess for parallel coupling, 1/(1 + rho) with the guess of rho"
-        )
-    if role.start is not None:
-        why = (
-            "with friction a guess: a run at it, with its ratio of residuals, tells more; "
-            f"without friction {role.start.theta_free:.4g} is proved, as is this one"
-        )
-        return NextRun(theta=role.start.theta_guess, why=why)
-    largest = seen.largest(role)
-    who = "either body" if tried is None else f"body {tried}"
-    where = "tied" if parallel else "without friction or tied"
-    among = "the largest bound above" if seen.corners is None else "the bound above"
-    why = (
-        f"the Neumann problem on {who}, 1/(2 + {largest:.4g}) with {among}, which contracts {where} "
-        f"if rho is below {3 + 2 * largest:.4g}; halve it if the residual does not fall{or_at_one(largest)}"
-    )
-    return NextRun(theta=rounded_down(1 / (2 + Fraction(largest))), why=why)

@@ -2,39 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from fractions import Fraction
-from typing import Any
-
 from ndtheory.constants import LARGEST, SMALLEST, take
 from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import Numeric
-from verification.coupling import methods
+from verification.coupling.advice import Advice
+from verification.coupling.kinds import kind_of
 from verification.coupling.readings import (
-    AT_ONE,
     LARGEST_TO_PASTE,
-    LIKE_ONE,
-    OF_OPEN_NODES,
     Made,
     NextRun,
     Observed,
-    RunReading,
-    SeenRun,
-    anew,
     assumed,
     few,
-    pasted_or_not,
     read_observed,
     rounded_down,
     spread,
 )
-from verification.coupling.roles import Advice, role_of, table_of
+from verification.coupling.runs import OneRun, decided
 from verification.coupling.runs_with_friction import friction_bounds, next_with_friction, readings_with_friction
-from verification.interface.pair import UNITS
-
-#: Reason for a missing theta for a tied interface.
-ONE_END = "residuals show one end of the spectrum"
 
 
 def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: bool = False) -> Advice:
@@ -95,7 +80,7 @@ def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: 
     >>> found.roles, round(found.friction_bounds.image, 6), found.next.theta
     ((), 0.022, 0.3146)
     """
-    assumes = assumed(tied, friction)
+    assumed(tied, friction)  # one of both at most
     t = take("theta", theta, "the theta of a run, 0 < theta <= 1 (1e-75 or more)", lambda v: SMALLEST <= v <= 1)
     needed = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
     r = take("ratio", ratio, needed, lambda v: SMALLEST <= v <= LARGEST)
@@ -110,46 +95,6 @@ def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: 
         rho = (1 + r) / t - 1
         why = f"2/(2 + rho) with rho = {few(rho)}, the pace at which a tied run grows"
         following = NextRun(theta=rounded_down(min(predicted_theta(rho), LARGEST_TO_PASTE)), why=why)
-    made, run = [Made(theta=t, falls=r < 1, rises=r >= 1, ratio=r)], SeenRun(theta=t, ratio=r)
-    known = {"assumes": assumes, "friction_bounds": bounds, "run": run}
-    return advice_of_runs(made, readings, following, rho, tied=tied, **known)
-
-
-def advice_of_runs(
-    made: Sequence[Made],
-    readings: Sequence[RunReading],
-    following: NextRun,
-    rho: Fraction | None,
-    *,
-    tied: bool,
-    **known: Any,
-) -> Advice:
-    """The advice from runs: a theta to paste where they decide rho, else a run that was not made yet.
-
-    ``following`` is the theta to paste, or the run that is proposed; ``rho`` is None while several readings are left;
-    readings that need nodes that open are left out where the interface is tied; ``known`` are other attributes of the
-    advice.
-    """
-    if rho is not None and (paste := pasted_or_not(following, made)) is not None:
-        following = paste
-    else:
-        following, rho = anew(following, made), None
-        learns = not following.kept and known.get("friction_bounds") is None
-        if learns and not any(one.rises or one.theta >= LIKE_ONE for one in made):
-            following = replace(following, why=f"{following.why}. {AT_ONE}")
-    roles = []
-    if rho is not None:
-        reason = {"neumann_body": "whichever body had the Neumann problem in that run", "rho_min": ONE_END}
-        roles.append(role_of(None, rho, nothing="an observed ratio proves nothing", reason=reason))
-    table = table_of(roles, tied=tied, one_end=True, theta=following.theta)
-    return Advice(
-        neumann_body=None,
-        methods=table,
-        method=methods.advised(table, tied=tied),
-        roles=tuple(roles),
-        units=UNITS,
-        readings=tuple(one for one in readings if not (tied and one.kind in OF_OPEN_NODES)),
-        next=following,
-        tied=tied,
-        **known,
-    )
+    made = [Made(theta=t, falls=r < 1, rises=r >= 1, ratio=r)]
+    found = decided(made, readings, following, rho, tied=tied, friction_bounds=bounds)
+    return Advice.of(OneRun(kind=kind_of(tied=tied), rubs=friction, theta=t, ratio=r, **found))

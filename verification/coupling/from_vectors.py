@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from ndtheory import Number
-from verification.coupling import methods
-from verification.coupling.methods import MethodRow
-from verification.coupling.roles import PROVED, Advice, Role, role_on, table_of
-from verification.coupling.spectrum import SeenVectors, Spectrum, seen_in
+from verification.coupling.advice import Advice
+from verification.coupling.vectors import seen_in
 from verification.interface.matrices import real_array, size
-from verification.interface.pair import UNITS
-
-#: Why nothing is proved.
-ESTIMATED = "from which eigenvalues were estimated, prove nothing"
 
 
 def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
@@ -23,7 +15,7 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
     T x is what the contact body answers to the displacement that the Neumann body has under the force x, before it is
     relaxed; or any other quantity that is exchanged, as temperatures and fluxes.  Three to ten iterates are enough for
     most couplings.  While contact does not change, the differences of these vectors show eigenvalues of ``T``:
-    :func:`verification.coupling.spectrum.seen_in`.
+    :func:`verification.coupling.vectors.seen_in`.
 
     Parameters
     ----------
@@ -64,58 +56,4 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
         raise ValueError(f"X and TX are {shapes}: needed an image for each iterate, of the same length")
     if len(given[0]) < 2:
         raise ValueError(f"X is {size(given[0])}: needed {needed}")
-    return advice_of(seen_in(*given, tied=tied), tied=tied)
-
-
-def advice_of(seen: SeenVectors, *, tied: bool = False) -> Advice:
-    """The advice for a spectrum that vectors show."""
-    if not (seen.settled or tied) or seen.negative:
-        return Advice(neumann_body=None, roles=(), units=UNITS, vectors=seen)
-    linear = tied or not seen.changing
-    spectrum = seen.spectrum if linear else seen.spectrum.with_open_nodes()
-    if not seen.high_found:
-        return _of_the_least_end(spectrum, seen, tied=linear)
-    return advice_on(spectrum, tied=linear, of="vectors", vectors=seen)
-
-
-def _of_the_least_end(spectrum: Spectrum, seen: SeenVectors, *, tied: bool) -> Advice:
-    """The advice while the largest eigenvalue is not found: the exchanged roles, where the least one is.
-
-    Their largest eigenvalue is one over the least of these roles; their least one may be any down to 0.
-    """
-    because = dict.fromkeys(("theta_predicted", "rate_predicted", *PROVED, "friction_threshold"), seen.why_no_theta)
-    reason = {**_unnumbered("vectors"), **because, "rho_min": seen.why_no_theta}
-    role = Role(neumann_body=None, rho=Number.of_float(max(spectrum.high, 0.0)), spectrum=spectrum, reason=reason)
-    table: tuple[MethodRow, ...] = ()
-    if seen.low_found and spectrum.low - spectrum.error_low > 0:
-        exchanged = _role(spectrum.exchanged().with_open_nodes(), "vectors")
-        table = tuple(replace(row, exchanged=True) for row in table_of([exchanged], tied=True))
-    method = methods.advised(table, tied=tied)
-    return Advice(neumann_body=None, roles=(role,), units=UNITS, tied=tied, methods=table, method=method, vectors=seen)
-
-
-def advice_on(spectrum: Spectrum, *, tied: bool, of: str, **known: Any) -> Advice:
-    """The advice on an estimated spectrum, in which open nodes are already; ``of`` names what it was read from."""
-    roles = [_role(spectrum, of)]
-    if spectrum.low - spectrum.error_low > 0:
-        roles.append(_role(spectrum.exchanged(), of))
-    table = table_of(roles, tied=True)
-    return Advice(
-        neumann_body=None,
-        roles=tuple(roles[:1]),
-        units=UNITS,
-        tied=tied,
-        methods=table,
-        method=methods.advised(table, tied=tied),
-        **known,
-    )
-
-
-def _role(spectrum: Spectrum, of: str) -> Role:
-    """The role of an estimated spectrum."""
-    return role_on(None, spectrum, nothing=f"{of}, {ESTIMATED}", reason=_unnumbered(of))
-
-
-def _unnumbered(of: str) -> dict[str, str]:
-    """The reason why the body of a role has no number."""
-    return {"neumann_body": f"{of} do not tell which body had the Neumann problem"}
+    return Advice.of(seen_in(*given, tied=tied))

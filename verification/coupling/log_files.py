@@ -37,19 +37,11 @@ RUN_AGAIN = "run again with constant relaxation: where it changes, the ratios of
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """The residuals of one field.
+    """The residuals of one field, of each time window in their order.
 
-    Attributes
-    ----------
-    name : str
-    residual : {'absolute', 'relative', 'previous', 'drop', 'assumed'}
-        ``|T x - x|``; the same over ``|T x|``; over ``|x|``; over the first or the largest one of its window, so that
-        it has the ratios of the absolute residual; taken as absolute because nothing says otherwise.
-    windows : tuple of array
-        The residuals of each time window in their order.
-    digits, decimals : float
-        Rounding of a number relative to its size, as its digits have it; rounding of a number that is written with a
-        fixed number of decimals, else 0.
+    They are absolute, ``|T x - x|``; relative, over ``|T x|``; previous, over ``|x|``; a drop, over the first or the
+    largest one of the window, so that it has the ratios of the absolute one; or assumed to be absolute.  ``digits`` is
+    the rounding relative to the size of a number, ``decimals`` that of numbers with a fixed number of decimals, else 0.
     """
 
     name: str
@@ -63,20 +55,10 @@ class Column:
 class Log:
     """A log as it was read.
 
-    Attributes
-    ----------
-    theta : float or None
-        The relaxation factor that the log itself names.
-    theta_rounding : float
-        Rounding of theta as it is written there; 0 if it has all its digits.
-    accelerator : str or None
-        The rule that the log names where it is not constant relaxation.
-    factors : tuple of array
-        Of each window, the factor of the relaxation after each residual of the first column, nan where none is named.
-    counts : tuple of int
-        Iterations of each window, of a log that has no residuals.
-    notes : tuple of str
-        About lines that were left out.
+    ``theta`` is the relaxation factor that the log itself names, ``theta_rounding`` its rounding as it is written, and
+    ``accelerator`` the rule that it names where that is not constant relaxation.  ``factors`` has, of each window, the
+    factor after each residual of the first column, nan where none is named; ``counts`` the iterations of each window,
+    of a log that has no residuals; ``notes`` are about lines that were left out.
     """
 
     path: Path

@@ -1,10 +1,12 @@
-"""Forms of logs that print a line for each residual: which lines have the iteration, the residual and the factor."""
+"""Logs that print a line for each residual: what a form says of the lines with iteration, residual and factor."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
 from typing import Literal
+
+from verification.registry import LOG_FORMATS
 
 Residual = Literal["absolute", "relative", "previous", "drop", "assumed"]
 
@@ -18,30 +20,14 @@ class PatternError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Form:
-    """A form of logs whose lines are searched one by one.
+    """A form of logs whose lines are searched one by one; any of its ``signs`` shows it.
 
-    Attributes
-    ----------
-    name : str
-    signs : tuple of str
-        Any of them shows that a log has this form.
-    line : pattern
-        Has some of the groups ``iteration``, ``field``, ``residual``, ``theta``, a factor, and ``omega``, one that is
-        Aitken's where it changes.
-    words : tuple of str
-        Only lines with one of them are searched; none for all lines.
-    residual, label : str
-        The kind of the residuals, and their name, with ``{}`` for the field.
-    needed : str
-        What to do for a log that has no residuals.
-    accelerator : pattern or None
-        Its first group is the name of a rule that is not constant relaxation.
-    rounded : bool
-        True if the factor is written in a figure or two, so that it may be another one.
-    every_step : bool
-        True if constant relaxation and Aitken print their factor in every iteration, and quasi-Newton does not.
-    again : bool
-        True if every iteration prints all residuals of its window once more.
+    ``line`` has some of the groups ``iteration``, ``field``, ``residual``, ``theta``, a factor, and ``omega``, one that
+    is Aitken's where it changes.  Only lines with one of the ``words`` are searched, or all.  ``label`` is the name of
+    a residual, with ``{}`` for the field; ``needed`` what to do for a log that has none; the first group of
+    ``accelerator`` the name of a rule that is not constant.  A factor is ``rounded`` if it is written in a figure or
+    two; with ``every_step`` constant relaxation and Aitken print it in every iteration and quasi-Newton does not;
+    ``again`` if every iteration prints all residuals of its window once more.
     """
 
     name: str
@@ -57,81 +43,9 @@ class Form:
     again: bool = False
 
 
-# The lines were read in: Kratos, convergence_criteria and convergence_accelerators of CoSimulationApplication, and logs
-# of version 10.4.4; solids4foam, the sources of fluidSolidInterfaces (fluidSolidInterface.C, AitkenCouplingInterface.C,
-# IQNILSCouplingInterface.C) and the output shown in its pages on fluids and solids; Norma.jl, src/evolve.jl and
-# src/schwarz.jl; Feel++ (commit 03cff286), feelpp/feel/feelalg/aitken.hpp, printInfo; MOOSE, PicardSolve.C,
-# SecantSolve.C and SteffensenSolve.C in framework/src/executioners, printFixedPointConvergenceHistory.
-FORMS = (
-    Form(
-        name="Kratos CoSimulation",
-        signs=("abs-norm =", "abs_norm =", "Coupling iteration:"),
-        words=("abs-norm", "abs_norm", "Coupling iteration", "Convergence for", "factor"),
-        line=re.compile(
-            r"Coupling iteration:\s*(?P<iteration>\d+)\s*/"
-            r"|Convergence for \"(?P<field>[^\"]+)\""
-            r"|abs[-_]norm\s*=\s*(?P<residual>[^\s|]+)(?=[\s|])"  # a last line may be cut off in a number
-            r"|relaxation[^\d=]*factor\s*=\s*(?P<theta>[^\s,]+)(?=[\s,])"
-        ),
-        label="abs-norm of {}",  # the norm of the residual over a constant
-        needed="needed residuals: set echo_level to 3 or more in the convergence criteria",
-        rounded=True,  # of Kratos 10
-        # the name with which an accelerator begins a line, but that of constant relaxation: a path may have any of them
-        accelerator=re.compile(
-            r"^(?:\[WARNING\] )?(?!ConstantRelaxation)(\w*(?:Aitken|Anderson|MVQN|IBQN|IQN|ConvergenceAccelerator)\w*)"
-            r"\s*:",
-            re.IGNORECASE | re.MULTILINE,
-        ),
-    ),
-    Form(
-        name="solids4foam",
-        signs=("fsi relative residual norm", "FSI relative residual norm"),
-        words=("iteration:", "factor", "residual norm"),
-        line=re.compile(
-            r"Time = \S+, iteration:\s*(?P<iteration>\d+)\s*$"
-            r"|under-relaxation factor[^:]*:\s*(?P<theta>\S+)(?=\s)"
-            r"|[Cc]urrent (?:fsi|FSI) relative residual norm(?: \((?P<field>[^)]*)\))?:\s*(?P<residual>\S+)(?=\s)"
-        ),
-        residual="drop",  # over the largest one so far
-        accelerator=re.compile(r"under-relaxation factor \((Aitken)\)"),
-        every_step=True,
-    ),
-    Form(
-        name="Norma.jl",
-        signs=("|ΔU|/|U| =",),
-        words=("Criterion", "Relaxation:"),
-        line=re.compile(
-            r"Criterion \[(?P<iteration>\d+)\] \|ΔU\| = (?P<residual>[^\s:]+)(?=[\s:])"
-            r"|Relaxation: fixed, θ = (?P<theta>\S+)(?=\s)"
-        ),
-        label="|ΔU|",
-        accelerator=re.compile(r"(?:Relaxation: )?(Aitken[- ]\w+|Anderson)(?:,| θ)"),
-    ),
-    Form(
-        name="Feel++",
-        signs=("[Aitken] iteration :",),
-        words=("[Aitken]",),
-        line=re.compile(
-            r"\[Aitken\] iteration : (?P<iteration>\d+) theta=(?P<omega>\S+) residualNorm : (?P<residual>\S+)(?=\s)"
-        ),
-        residual="previous",  # over the last element
-        label="residualNorm",
-    ),
-    Form(
-        name="MOOSE",
-        signs=(" Picard |R| =", " Secant |R| =", " Steffensen |R| ="),
-        words=("|R| =",),
-        line=re.compile(r"(?P<iteration>\d+) \w+ \|R\| (?==)|= (?P<residual>[-+.\w]+)(?=\s)"),
-        label="|R|",  # of the equations of the main application, an image of the change
-        accelerator=re.compile(r"\d (Secant|Steffensen|Anderson) \|R\| ="),
-        again=True,
-    ),
-)
-
-
 def form_of(text: str) -> Form | None:
     """The form whose signs a log has; None where it has none."""
-    return next((form for form in FORMS if any(sign in text for sign in form.signs)), None)
+    return next((form for form in LOG_FORMATS.values() if any(sign in text for sign in form.signs)), None)
 
 
 def form_of_pattern(pattern: str) -> Form:

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from ndtheory.keys import Part, key
 from verification.algorithm.loop import Ending, Evaluation, Outcome, evaluations, follow
 from verification.coupling.kinds import METHODS, BodyNumber
 from verification.coupling.spectrum import Spectrum
@@ -34,53 +34,42 @@ LITTLE = 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class MethodRow:
-    """A method in one assignment of the roles.
+class MethodRow(Part):
+    """A method in one assignment of the roles."""
 
-    Attributes
-    ----------
-    method : {'constant', 'aitken', 'iqn-ils'}
-    neumann_body : {1, 2} or None
-        None where the bodies have no numbers.
-    exchanged : bool
-        True if the roles are exchanged, compared with the file or the run.
-    theta : float
-        The factor, or the first one.
-    steps : int or None
-        Evaluations of T; None where it does not arrive within MOST of them.
-    bound : {'at most'} or None
-        Of a constant theta where only the largest eigenvalue is known; None if ``steps`` is a prediction.
-    """
-
-    method: str
-    neumann_body: BodyNumber | None
-    exchanged: bool
-    theta: float
-    steps: int | None
-    bound: str | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``methods``."""
-        why = {
-            "steps": f"not in {COUNTED if self.method == 'constant' else MOST:g} steps",
-            "bound": "a prediction, no bound",
-            "neumann_body": "the bodies have no numbers",
-        }
-        return {**vars(self), "reason": {name: words for name, words in why.items() if getattr(self, name) is None}}
+    method: str = key("`constant`, `aitken` or `iqn-ils`")
+    neumann_body: BodyNumber | None = key(
+        "the body with the Neumann problem",
+        type="integer",
+        null="where bodies have no numbers, as of vectors and logs",
+        why="the bodies have no numbers",
+    )
+    exchanged: bool = key("whether the roles are exchanged, compared with the file or the run")
+    theta: float = key("the constant factor; of the other two the first one", unit="1")
+    steps: int | None = key(
+        r"evaluations of $T$ from $x = 0$ until $\lvert Tx - x\rvert < 10^{-6}\,\lvert Tx\rvert$, with every "
+        "eigenvalue equally in the first error",
+        unit="1",
+        null="where it does not arrive",
+        why=lambda row: f"not in {COUNTED if row.method == 'constant' else MOST:g} steps",
+    )
+    bound: str | None = key(
+        "`at most` of a constant theta where only the largest eigenvalue is known: then `steps` suffice for "
+        "eigenvalues from 0 to it and any first error",
+        null="of a prediction",
+        why="a prediction, no bound",
+        default=None,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Advised:
-    """The method that is advised, the body that gets the Neumann problem with it, and the reason in a sentence."""
+class Advised(Part):
+    """The method that is advised."""
 
-    name: str
-    neumann_body: BodyNumber | None
-    exchanged: bool
-    reason: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``method``."""
-        return dict(vars(self))
+    name: str = key("one of `methods.method`")
+    neumann_body: BodyNumber | None = key("as in `methods`, also null", type="integer or null")
+    exchanged: bool = key("as in `methods`")
+    reason: str = key("its steps, and those of others")
 
 
 def rows(

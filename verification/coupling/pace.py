@@ -61,24 +61,13 @@ Kind = Literal["steady", "level", "floor", "plateau", "unsteady", "short"]
 
 @dataclass(frozen=True, kw_only=True)
 class Pace:
-    """The course of one series of residuals.
+    """The course of one series of residuals: the ratio of consecutive ones, or P of a plateau, with its limits.
 
-    Attributes
-    ----------
-    kind : {'steady', 'level', 'floor', 'plateau', 'unsteady', 'short'}
-        ``floor`` is a level so low that the accuracy of the participants' solvers may set it; its ratio comes from the
-        steady steps before.
-    value, least, most : float or None
-        The ratio of consecutive residuals, or P of a plateau, and its limits.
-    steps, length : int
-        Number of steps of the series that can be read, and of all its residuals.
-    height : float
-        The last residual as a share of the largest one; where it is lost in rounding or zero, the share of rounding.
-    lost, arrived : bool
-        True if the series ends in inf or nan; True if it ends in rounding or in zero, a step after those that can be
-        read.
-    adapts : bool
-        True if it falls much faster than before after it rose: a constant factor does not do that.
+    ``floor`` is a level so low that the accuracy of the participants' solvers may set it; its ratio comes from the
+    steady steps before.  ``steps`` of ``length`` residuals can be read.  ``height`` is the last one as a share of the
+    largest; where it is lost in rounding or zero, the share of rounding.  The series is ``lost`` if it ends in inf or
+    nan, has ``arrived`` if it ends in rounding or zero, a step after those that can be read, and ``adapts`` if it falls
+    much faster than before after it rose: a constant factor does not do that.
     """
 
     kind: Kind

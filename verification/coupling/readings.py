@@ -6,9 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from ndtheory.energy_norms import predicted_theta
+from ndtheory.keys import Part, key
+from ndtheory.keys import says as means
 from ndtheory.number import below, directed
 
 #: The largest theta that is offered to paste.
@@ -41,6 +43,14 @@ NEXT_TO_1 = Fraction(999, 1000)
 #: A run to make next has a theta larger by this factor at least, unless that would come too close to 1.
 SHORTEST_STEP = Fraction(9, 8)
 
+_LIMITS: dict[str, Any] = {
+    "says": "between which values it lies: scatter, drift and rounding of a window, and the spread of the windows; of "
+    "ten windows and more, and where pooled, without the outer tenths",
+    "type": "number",
+    "unit": "1",
+    "of": float,
+}
+
 #: The readings that need nodes that open, which a tied interface does not have.
 OF_OPEN_NODES = ("open", "level")
 
@@ -52,85 +62,75 @@ SAME = Fraction(1, 20)
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunReading:
+class RunReading(Part):
     """One possible meaning of the ratio of a run.
 
-    Attributes
-    ----------
-    kind : {'mode-high', 'mode-low', 'level', 'plateau', 'open'}
-        The cause of the pace: the stiffest mode in contact, which changes sign in every step; the softest one, which
-        keeps its sign; contact that opens and closes alternately, so that the residual stays at a level; a tied run
-        that diverges, so that its relative residual stays at a plateau; nodes that are open.
-    value, lo : float or None
-        rho where all of Gamma_c is closed and nothing slides, None where the reading gives a bound at most; if this
-        reading is right, rho is at least ``lo`` without friction, or tied.
-    says : str
-        The same in words.
+    Its ``kind`` is the cause of the pace: the stiffest mode in contact, which changes sign in every step; the softest
+    one, which keeps its sign; contact that opens and closes alternately, so that the residual stays at a level; a tied
+    run that diverges, so that its relative residual stays at a plateau; nodes that are open.
     """
 
-    kind: Literal["mode-high", "mode-low", "level", "plateau", "open"]
-    value: float | None = None
-    lo: float | None = None
-    says: str
+    part: ClassVar[str] = "Reading of a run"
 
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``readings``; its level is the one of the arithmetic."""
-        reason = {"rho.hi": "a run bounds rho from below at most"}
-        if self.value is None:
-            reason["rho.value"] = "this reading does not tell rho itself"
-        if self.lo is None:
-            reason["rho.lo"] = "this reading does not bound rho"
-        rho = {"value": self.value, "lo": self.lo, "hi": None, "level": "float" if self.lo is None else "exact"}
-        return {"kind": self.kind, "rho": rho, "says": self.says, "reason": reason}
+    kind: Literal["mode-high", "mode-low", "level", "plateau", "open"] = key(
+        "`mode-high`, `mode-low`, `level`, `plateau` or `open`"
+    )
+    value: float | None = key(
+        "rho where all of Gamma_c is closed and nothing slides; null where it does not follow, and with friction",
+        name="rho.value",
+        type="number or null",
+        unit="1",
+        default=None,
+    )
+    lo: float | None = key(
+        "rho is at least this if the reading is right, without friction or tied; null where that does not bound rho",
+        name="rho.lo",
+        type="number or null",
+        unit="1",
+        default=None,
+    )
+
+    @property
+    @means("null: a run bounds rho from below at most", name="rho.hi", type="number or null", unit="1")
+    def hi(self) -> None:
+        """No bound from above."""
+
+    @property
+    @means("the level of the arithmetic, see **Number**", name="rho.level")
+    def level(self) -> str:
+        return "float" if self.lo is None else "exact"
+
+    @property
+    @means("why `rho.value`, `rho.lo` or `rho.hi` is null")
+    def reason(self) -> dict[str, str]:
+        why = {"value": "this reading does not tell rho itself", "lo": "this reading does not bound rho"}
+        reason = {f"rho.{name}": words for name, words in why.items() if getattr(self, name) is None}
+        return {"rho.hi": "a run bounds rho from below at most"} | reason
+
+    says: str = key("the same in words")
 
 
 @dataclass(frozen=True, kw_only=True)
-class NextRun:
+class NextRun(Part):
     """The run to make next: its theta, and why.
 
     ``kept`` is True if a run with this theta was made and is to be kept, ``again`` if it is to be made again because
     its log was too short or not steady.
     """
 
-    theta: float
-    why: str
+    theta: float = key(unit="1")
+    why: str = key("what it will show; it begins with `keep it` where a run with this theta is to be kept")
     kept: bool = False
     again: bool = False
 
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``next``."""
-        return {"theta": self.theta, "why": self.why}
-
 
 @dataclass(frozen=True, kw_only=True)
-class SeenRun:
-    """A run of any code with constant theta, and the ratio of its absolute unrelaxed residual from step to step."""
-
-    theta: Fraction
-    ratio: Fraction
-
-    @property
-    def steps(self) -> int:
-        """Number of steps over which the ratio must be steady, at least."""
-        return steps_needed(self.theta)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``run``."""
-        return {
-            "theta": float(self.theta),
-            "ratio": float(self.ratio),
-            "residual": "|Tg - g|, absolute and unrelaxed",
-            "steady_over": self.steps,
-        }
-
-
-@dataclass(frozen=True, kw_only=True)
-class Observed:
+class Observed(Part):
     """A number that was read from a run, and its limits."""
 
-    value: Fraction
-    least: Fraction
-    most: Fraction
+    value: Fraction = key("the median over the windows", type="number", unit="1", of=float)
+    least: Fraction = key(**_LIMITS)
+    most: Fraction = key(**_LIMITS)
 
     @classmethod
     def of(cls, value: float | Fraction, least: float | Fraction, most: float | Fraction) -> Observed:
@@ -149,10 +149,6 @@ class Observed:
 
     def __str__(self) -> str:
         return f"{few(self.value)} ({few(self.least)} to {few(self.most)})"
-
-    def to_dict(self) -> dict[str, float]:
-        """The objects ``ratio``, ``plateau`` and ``pooled`` of a column."""
-        return {"value": float(self.value), "least": float(self.least), "most": float(self.most)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ from fractions import Fraction
 from itertools import combinations
 from typing import Any
 
+from ndtheory.keys import Part, key
 from ndtheory.number import above, below
 from verification.coupling.ends import DEAR, SWIFT
 from verification.coupling.readings import (
@@ -47,32 +48,35 @@ _SAYS = {
 }
 
 
+_FASTEST: dict[str, Any] = {
+    "says": r"the largest theta whose residual falls, and its ratio at most: near that solution a smaller $\theta'$ "
+    r"takes at most $1 - (1 - \text{rate})\,\theta'/\theta$ a step",
+    "unit": "1",
+    "null": "where no residual falls",
+    "why": "no residual falls steadily",
+}
+
+
 @dataclass(frozen=True, kw_only=True)
-class FrictionBounds:
-    """Bounds that runs with friction prove.
+class FrictionBounds(Part):
+    """Bounds that runs with friction prove; ``sqrt(rho) R`` is at least ``image``, too."""
 
-    Attributes
-    ----------
-    image : float or None
-        The Lipschitz constant of T in the norm (5.21) is at least this, and so is ``sqrt(rho) R``; None where the runs
-        are too fast for a bound above 0.
-    theta, rate, eigenvalue : float or None, and tuple of float or None
-        The largest theta whose residual falls, its ratio at most, and limits of ``|1 + lambda|`` of its slowest mode;
-        None where no residual falls.
-    """
-
-    image: float | None
-    theta: float | None
-    rate: float | None
-    eigenvalue: tuple[float, float] | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``friction_bounds``."""
-        reason = {} if self.image is not None else {"image": "every run is as fast as with open nodes alone"}
-        if self.eigenvalue is None:
-            reason |= dict.fromkeys(("theta", "rate", "eigenvalue"), "no residual falls steadily")
-        modes = None if self.eigenvalue is None else dict(zip(("least", "most"), self.eigenvalue, strict=True))
-        return {**vars(self), "eigenvalue": modes, "reason": reason}
+    image: float | None = key(
+        "the Lipschitz constant of $T$ in the norm (5.21) is at least this",
+        unit="1",
+        null="where every run is as fast as with only open nodes",
+        why="every run is as fast as with open nodes alone",
+    )
+    theta: float | None = key(**_FASTEST)
+    rate: float | None = key(**_FASTEST)
+    eigenvalue: tuple[float, float] | None = key(
+        r"limits `least` and `most` of $\lvert 1 + \lambda\rvert$ for the slowest mode of that run",
+        type="map of number",
+        unit="1",
+        null="where there is none",
+        why="no residual falls steadily",
+        of=lambda ends: dict(zip(("least", "most"), ends, strict=True)),
+    )
 
 
 Runs = list[tuple[Fraction, Observed]]

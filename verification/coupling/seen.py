@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from ndtheory.keys import Part, key
+from ndtheory.keys import says as means
 from ndtheory.number import above, below
 from verification.coupling.log_files import Column
 from verification.coupling.pace import MOST_WINDOWS, RELATIVE, Pace, pace, pooled, together
 from verification.coupling.readings import FEWEST_STEPS, Made, NextRun, Observed, RunReading, few, steps_needed
-from verification.value import to_plain
 
 #: A residual below this share of its largest value has fallen, although the log is too short for a ratio.
 FALLEN = 0.1
@@ -24,10 +25,14 @@ FROM_BELOW = "no friction, or a tied interface"
 TIED = "a tied interface"
 FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
 
-_WHY_NOT = {
-    "ratio": "no window shows one",
-    "plateau": "no window shows one",
-    "pooled": "windows are read one by one, or are too few or too short to be pooled",
+_TOGETHER: dict[str, Any] = {
+    "says": "from all windows together",
+    "null": "where no window shows one",
+    "why": "no window shows one",
+}
+_BOUND: dict[str, Any] = {
+    "says": r"the largest lower bound of $\rho$, and the smallest upper bound",
+    "null": "where no log gives one",
 }
 
 #: The kinds of a pace, in words.
@@ -42,37 +47,47 @@ _WORDS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeenColumn:
-    """The residuals of one field of a log.
+class SeenColumn(Part):
+    """The residuals of one field of a log, with the paces of the windows that were read.
 
-    Attributes
-    ----------
-    name, residual : str
-        The kind is ``absolute``, ``relative``, ``drop``, or ``assumed``: taken as absolute.
-    paces, windows : tuple of Pace, int
-        Of the time windows that were read, and the number of all; short ones are not read where there are others, of
-        many the last ones.
-    ratio, plateau : Observed or None
-        Of the windows put together.
-    pooled : Observed or None
-        The pace of windows of which none shows a ratio, which bounds nothing.
+    Short windows are not read where there are others, of many the last ones.
     """
 
-    name: str
-    residual: str
+    name: str = key("as the log names it")
+    residual: str = key(
+        "`absolute`; `relative`, over the size of $Tg$; `previous`, over that of $g$; `drop`, over the first or the "
+        "largest one of the window; `assumed`, taken as absolute because its name does not tell"
+    )
     paces: tuple[Pace, ...]
-    windows: int
-    ratio: Observed | None
-    plateau: Observed | None
-    pooled: Observed | None = None
+    windows: int = key("time windows in the log", unit="1")
+    ratio: Observed | None = key(**_TOGETHER)
+    plateau: Observed | None = key(**_TOGETHER)
+    pooled: Observed | None = key(
+        "the ratio over the second halves of all windows, where none shows a ratio: it bounds nothing",
+        null="where windows are read one by one, or are fewer than five",
+        why="windows are read one by one, or are too few or too short to be pooled",
+        default=None,
+    )
+
+    @property
+    @means(
+        "windows whose residual changes by a steady ratio at its end (`steady`), stays at a `level`, is relative and "
+        "flat above 1 (`plateau`), ends at a level below 1e-3 of the largest, which the accuracy of the solvers may "
+        "set (`floor`), or from which nothing follows (`unsteady`, and `short` of too few steps); of more than 300 "
+        "windows the last ones are read, and only those of ten steps and more where there are any",
+        type="map of integer",
+        unit="1",
+    )
+    def read(self) -> dict[str, int]:
+        return {kind: self.count(kind) for kind in _WORDS}
 
     def count(self, *kinds: str) -> int:
         """Number of windows that were read and are of these kinds."""
         return sum(pace.kind in kinds for pace in self.paces)
 
     @property
+    @means("the same in words")
     def says(self) -> str:
-        """The column in words."""
         if len(self.paces) == 1:
             found = _WORDS[self.paces[0].kind]
         else:
@@ -87,19 +102,6 @@ class SeenColumn:
         if self.pooled is not None:
             found += f"; pooled, the second half of each: ratio {self.pooled}"
         return found
-
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``logs.columns``."""
-        numbers: dict[str, Observed | None] = {name: getattr(self, name) for name in _WHY_NOT}
-        return {
-            "name": self.name,
-            "residual": self.residual,
-            "windows": self.windows,
-            "read": {kind: self.count(kind) for kind in _WORDS},
-            **{name: to_plain(number) for name, number in numbers.items()},
-            "says": self.says,
-            "reason": {name: why for name, why in _WHY_NOT.items() if numbers[name] is None},
-        }
 
 
 def seen_column(column: Column, theta: Fraction) -> SeenColumn:
@@ -126,32 +128,31 @@ def _same(one: Observed, other: Observed) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeenLog:
+class SeenLog(Part):
     """One log of a run with constant theta.
 
-    Attributes
-    ----------
-    file, form, theta : str, str, Fraction
-    columns : tuple of SeenColumn
-    readings, rho : tuple of RunReading, Fraction or None
-        Possible meanings of this log, none where nothing in it is steady; rho of the only reading.
-    next : NextRun
-        The run to make next if this were the only log.
-    notes : tuple of str
+    If this were the only log ``next`` would be the run to make; ``rho`` belongs to the only reading.
     """
 
-    file: str
-    form: str
-    theta: Fraction
-    columns: tuple[SeenColumn, ...]
-    readings: tuple[RunReading, ...]
+    file: str = key("the path as given")
+    form: str = key("the name of its form, `columns`, or `pattern`")
+    theta: Fraction = key("as given, or as the log names it", type="number", unit="1", of=float)
+    columns: tuple[SeenColumn, ...] = key("the residuals of each field")
+    readings: tuple[RunReading, ...] = key(
+        "the possible readings of this log without the others; empty where nothing in it is steady or at a level"
+    )
     next: NextRun
     rho: Fraction | None
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = key("lines that were left out")
 
     @property
+    @means(
+        "over how many steps a ratio had to be steady; ten or half of the steps suffice where the residual fell below "
+        "1e-6 of its largest",
+        name="steady_over",
+        unit="1",
+    )
     def steps(self) -> int:
-        """Number of steps over which a ratio had to be steady."""
         return steps_needed(self.theta)
 
     @property
@@ -237,57 +238,39 @@ class SeenLog:
         most = None if self.slowest is None else self.slowest.most
         return Made(theta=self.theta, falls=self.falls, rises=self.diverges, ratio=most)
 
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``logs``."""
-        return {
-            "file": self.file,
-            "form": self.form,
-            "theta": float(self.theta),
-            "steady_over": self.steps,
-            "columns": to_plain(self.columns),
-            "readings": to_plain(self.readings),
-            "notes": list(self.notes),
-        }
-
 
 @dataclass(frozen=True, kw_only=True)
-class LogBound:
-    """A bound of rho, the log that it comes from, the reason in words, and its assumption."""
+class LogBound(Part):
+    """A bound of rho, and the log that it comes from."""
 
-    value: Fraction
+    value: Fraction = key(type="number", unit="1", of=below)
     log: SeenLog
-    says: str
-    assumes: str
 
-    def to_dict(self, *, up: bool) -> dict[str, Any]:
-        """The object ``interval.lo`` or ``interval.hi``, whose value is rounded outwards."""
-        return {
-            "value": above(self.value) if up else below(self.value),
-            "file": self.log.file,
-            "theta": float(self.log.theta),
-            "says": self.says,
-            "assumes": self.assumes,
-        }
+    @property
+    @means("the log it comes from")
+    def file(self) -> str:
+        return self.log.file
+
+    @property
+    @means("that of this log", unit="1")
+    def theta(self) -> float:
+        return float(self.log.theta)
+
+    says: str = key("what this log shows")
+    assumes: str = key("what must hold for the bound")
 
 
 @dataclass(frozen=True, kw_only=True)
-class RhoInterval:
+class RhoInterval(Part):
     """Bounds of rho from the logs of one coupling together; ``contradiction`` says why no rho lies between them."""
 
-    lo: LogBound | None
-    hi: LogBound | None
-    contradiction: str | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``interval``."""
-        agree = "the logs agree" if self.lo and self.hi else "one bound alone contradicts nothing"
-        why = {"lo": "no log bounds rho from below without a reading", "hi": "no log converges", "contradiction": agree}
-        return {
-            "lo": None if self.lo is None else self.lo.to_dict(up=False),
-            "hi": None if self.hi is None else self.hi.to_dict(up=True),
-            "contradiction": self.contradiction,
-            "reason": {name: words for name, words in why.items() if getattr(self, name) is None},
-        }
+    lo: LogBound | None = key(**_BOUND, why="no log bounds rho from below without a reading")
+    hi: LogBound | None = key(**_BOUND, why="no log converges", of=lambda hi: hi.to_dict() | {"value": above(hi.value)})
+    contradiction: str | None = key(
+        "which logs exclude each other",
+        null="where none do",
+        why=lambda rho: "the logs agree" if rho.lo and rho.hi else "one bound alone contradicts nothing",
+    )
 
 
 def bounds(logs: Sequence[SeenLog]) -> tuple[list[LogBound], list[LogBound]]:

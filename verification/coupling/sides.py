@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,9 +13,11 @@ from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d import MeshError, solver_with_inertia
 from fem1d2d.mesh import Floats
+from ndtheory.keys import Part, key
+from verification.coupling.evidence import Evidence
 from verification.coupling.kinds import BodyNumber
+from verification.coupling.roles import Role
 from verification.interface.matrices import MOST_ROWS, Stiffness, real_array, size, stiffness
-from verification.value import to_plain
 
 #: Up to this asymmetry the symmetric part of a matrix is taken, with a note.
 TOLD = 1e-3
@@ -36,29 +38,29 @@ BODIES: tuple[BodyNumber, BodyNumber] = (2, 1)
 Apply = Callable[[Floats], Floats]
 
 
+_NO_ENTRIES: dict[str, Any] = {"null": "of an operator", "why": "an operator tells no entries", "default": None}
+
 # --- in documents -----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeenMatrix:
-    """One matrix or operator.
+class SeenMatrix(Part):
+    """One matrix or operator."""
 
-    Attributes
-    ----------
-    rows, form : int, {'matrix', 'operator'}
-    asymmetry : float or None
-        ``max |A - A'| / max |A|``; of an operator ``|x'Ay - y'Ax|`` over the size of its terms for two random vectors;
-        None where only its solves are known.
-    zeros, free_motions : float or None, int or None
-        The share of zeros off the diagonal, and the number of rigid motions that its supports leave; None of an
-        operator.
-    """
+    part: ClassVar[str] = "Given stiffness"
 
-    rows: int
-    form: Literal["matrix", "operator"]
-    asymmetry: float | None = None
-    zeros: float | None = None
-    free_motions: int | None = None
+    rows: int = key("unknowns on the interface", unit="1")
+    form: Literal["matrix", "operator"] = key("`matrix` or `operator`")
+    asymmetry: float | None = key(
+        r"the largest entry of $S - S^\top$ over the largest entry of $S$; for an operator estimated with two random "
+        "vectors",
+        unit="1",
+        null="where only its solves are given",
+        why="known by its solves alone",
+        default=None,
+    )
+    zeros: float | None = key("share of zeros off the diagonal", unit="1", **_NO_ENTRIES)
+    free_motions: int | None = key("rigid motions that the supports leave", unit="1", **_NO_ENTRIES)
 
     def notes(self, name: str, rounding: float) -> list[str]:
         """Warnings for the user; an asymmetry up to ``rounding`` is rounding."""
@@ -76,64 +78,58 @@ class SeenMatrix:
             )
         return found
 
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``matrices``."""
-        why = {"asymmetry": "known by its solves alone"} | dict.fromkeys(
-            ("zeros", "free_motions"), "an operator tells no entries"
-        )
-        return {**asdict(self), "reason": {name: words for name, words in why.items() if getattr(self, name) is None}}
+
+_FOUND = (
+    "the largest and the least value found: the largest eigenvalue is at least the one, the least at most the other"
+)
+_RESIDUAL = "some eigenvalue lies within it of the value; not that it is the last one"
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeenLanczos:
-    """The ends of the spectrum of (S_c, S_n) for one role, by Lanczos.
+class SeenLanczos(Part):
+    """The ends of the spectrum of (S_c, S_n) for one role, by Lanczos, which finds Rayleigh quotients."""
 
-    ``rho`` and ``rho_min`` are Rayleigh quotients, so that the largest eigenvalue is at least ``rho`` and the least one
-    at most ``rho_min``; some eigenvalue lies within each residual.
-    """
-
-    neumann_body: BodyNumber
-    rho: float
-    residual: float
-    rho_min: float
-    residual_min: float
-    steps: int
+    neumann_body: BodyNumber = key(type="integer")
+    rho: float = key(_FOUND, unit="1")
+    residual: float = key(_RESIDUAL, unit="1")
+    rho_min: float = key(_FOUND, unit="1")
+    residual_min: float = key(_RESIDUAL, unit="1")
+    steps: int = key("products with the contact body", unit="1")
 
 
 @dataclass(frozen=True, kw_only=True)
-class SeenMatrices:
-    """The matrices or operators that were given.
+class Matrices(Evidence):
+    """The matrices or operators that were given, and the ``roles`` that they have."""
 
-    Attributes
-    ----------
-    S1, S2 : SeenMatrix
-    transfer, neumann_body : tuple of int or None, {1, 2} or None
-        Rows and columns of P as given, and the body from whose unknowns it leads; None without P.
-    ordering : str or None
-        The ordering that is assumed; None where rho does not depend on it.
-    lanczos : tuple of SeenLanczos
-        Empty where matrices gave the whole spectrum.
-    notes : tuple of str
-        Warnings for the user.
-    """
+    roles: tuple[Role, ...]
+    S1: SeenMatrix = key("those of bodies 1 and 2")
+    S2: SeenMatrix = key("those of bodies 1 and 2")
+    transfer: tuple[int, int] | None = key(
+        "rows and columns of $P$", unit="1", null="without a transfer", why="no transfer was given", default=None
+    )
+    neumann_body: BodyNumber | None = key(
+        "the body from whose unknowns $P$ leads",
+        type="integer",
+        null="without a transfer",
+        why="no transfer was given",
+        default=None,
+    )
+    ordering: str | None = key(
+        "the ordering of the unknowns that is assumed",
+        null=r"where $\rho$ does not depend on it",
+        why="rho does not depend on it, so long as both have the same",
+        default=None,
+    )
+    lanczos: tuple[SeenLanczos, ...] = key(
+        r"one for each role whose $\rho$ Lanczos found; empty where matrices gave the whole spectrum", default=()
+    )
+    notes: tuple[str, ...] = key(
+        "what a user should know: asymmetry, zeros as of an assembled matrix, which way $P$ was read", default=()
+    )
 
-    S1: SeenMatrix
-    S2: SeenMatrix
-    transfer: tuple[int, int] | None = None
-    neumann_body: BodyNumber | None = None
-    ordering: str | None = None
-    lanczos: tuple[SeenLanczos, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``matrices``."""
-        why = dict.fromkeys(("transfer", "neumann_body"), "no transfer was given")
-        why["ordering"] = "rho does not depend on it, so long as both have the same"
-        return {
-            **{name: to_plain(value) for name, value in vars(self).items()},
-            "lanczos": [asdict(found) for found in self.lanczos],
-            "reason": {name: words for name, words in why.items() if getattr(self, name) is None},
-        }
+    def spectra(self) -> tuple[Role, ...]:
+        """Both roles, as they were measured."""
+        return self.roles
 
 
 # --- one body ---------------------------------------------------------------------------------------------------------

@@ -23,18 +23,10 @@ ROOM, UNKNOWN = 2, 200
 
 @dataclass(frozen=True, kw_only=True)
 class CouplingScheme:
-    """Content of a snippet.
+    """Content of a snippet; the solver of the Neumann body reads forces and writes displacements.
 
-    Attributes
-    ----------
-    neumann_body : {1, 2} or None
-        Its solver reads forces and writes displacements; None where advice is for the roles that a run had.
-    theta, tied : float, bool
-        The relaxation factor; True if nothing opens or slips.
-    steps : int or None
-        To 1e-9 of the first error, by the rate of the advice.
-    force : str
-        The name of the relaxed data in preCICE.
+    That body is None where advice is for the roles that a run had.  ``steps`` are to 1e-9 of the first error, by the
+    rate of the advice; ``force`` is the name of the relaxed data in preCICE.
     """
 
     neumann_body: Literal[1, 2] | None

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ndtheory import EnergyConstants, evaluate_energy
 from ndtheory.energy_norms import predicted_factor
 from verification.constants import Measured
-from verification.coupling.roles import Advice
+from verification.coupling.advice import Advice
 from verification.figures.style import BODIES, THETA, legend_beside, new_figure, styled
 from verification.registry import draw
 
@@ -59,14 +59,13 @@ def _(result: Measured) -> Figure:
 @draw.register
 def _(result: Advice) -> Figure:
     """The factor of one step over theta, for each assignment of the roles."""
-    if not result.roles:
-        raise ValueError("several readings are left: make the run that `next` names")
-    if result.moduli is not None:
-        raise ValueError("moduli bound rho from below only: no factor of a step follows")
-    named = {
-        f"Neumann {result.words(role.neumann_body)}" if role.neumann_body else "that run": role for role in result.roles
+    if result.why_no_theta:
+        raise ValueError(result.why_no_theta)
+    known = {
+        f"Neumann {result.evidence.words(role.neumann_body)}" if role.neumann_body else "that run": role
+        for role in result.roles
     }
     energy = {
-        name: role.energy or EnergyConstants(rho=role.rho.value) for name, role in named.items() if role.rho is not None
+        name: role.energy or EnergyConstants(rho=role.rho.value) for name, role in known.items() if role.rho is not None
     }
     return draw_factor(energy)

@@ -10,7 +10,7 @@ from typing import Any
 
 import verification as vf
 from builder.scenes import axis, chart, dots, line, note, scene, slider, widget
-from verification.coupling.roles import Advice
+from verification.coupling.advice import Advice
 
 LABEL = "Residuals of a run over its steps, and the rho that the log of a run shows over its theta"
 

@@ -13,8 +13,9 @@ from ndtheory import HypothesisError
 from verification.coupling.accelerated import seen_accelerated
 from verification.coupling.from_logs import advise_logs
 from verification.coupling.log_files import read_log
-from verification.coupling.log_lines import PatternError, form_of_pattern
+from verification.coupling.log_lines import Form, PatternError, form_of_pattern
 from verification.problem.tables import ProblemError
+from verification.registry import LOG_FORMATS
 
 MODES = (0.2, 0.5, 1.1, 3.0)
 KRATOS = Path(__file__).parents[1] / "kratos_logs"
@@ -283,6 +284,15 @@ def test_a_pattern_with_names_splits_windows_and_reads_factors(tmp_path):
 def test_a_pattern_that_is_none_is_refused(pattern, words):
     with pytest.raises(PatternError, match=words):
         form_of_pattern(pattern)
+
+
+def test_a_form_of_logs_that_is_registered_is_read(tmp_path, monkeypatch):
+    form = Form(name="mine", signs=("step:",), line=re.compile(r"step: (?P<residual>\S+)"))
+    monkeypatch.setitem(LOG_FORMATS, "mine", form)
+    log = tmp_path / "mine.log"
+    log.write_text("".join(f"step: {0.5**n:.8e}\n" for n in range(20)), "utf-8")
+    assert read_log(log).form == "mine"
+    assert set(LOG_FORMATS.ours) == set(LOG_FORMATS) - {"mine"}
 
 
 def test_a_pattern_that_finds_nothing_or_no_number_is_refused(tmp_path):

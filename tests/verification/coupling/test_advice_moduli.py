@@ -318,7 +318,7 @@ def test_extreme_moduli_have_finite_answers(young, poisson, plane):
     assert "NaN" not in found.to_json()
     assert "Infinity" not in found.to_json()
     assert 0 < found.next.theta < 1
-    with pytest.raises(ValueError, match="no factor"):
+    with pytest.raises(ValueError, match="bound rho from below"):
         found.plot()
 
 

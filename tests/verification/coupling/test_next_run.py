@@ -212,7 +212,7 @@ def test_a_run_that_grows_a_millionfold_is_read_however_few_steps_it_has(tmp_pat
     found = advised(tmp_path, [(theta, falling(67.0, 33))], tied=tied)
     exactly = 68 / F(theta) - 1
     assert found.interval.lo.value == pytest.approx(float(exactly), rel=1e-6)
-    assert F(found.interval.lo.to_dict(up=False)["value"]) <= exactly
+    assert F(found.interval.lo.to_dict()["value"]) <= exactly
     assert found.logs[0].diverges
     assert found.next.theta < float(theta)
     assert found.next.theta * (1 + float(exactly)) < 2  # below the limit of the stiffest mode

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from linear_couplings import Linear, strips
 
 import verification as vf
-from verification.coupling.spectrum import Spectrum, seen_in
+from verification.coupling.spectrum import Spectrum
+from verification.coupling.vectors import seen_in
 from verification.registry import RULES
 
 spectra = st.lists(st.floats(0.01, 30), min_size=2, max_size=12).map(sorted)

@@ -1,0 +1,166 @@
+"""Sections of advice from runs of other codes: what they show of rho, and the run to make next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from verification.coupling.accelerated import Accelerated
+from verification.coupling.advice import Advice
+from verification.coupling.readings import RunReading
+from verification.coupling.runs import Logs, OneRun, Runs
+from verification.coupling.runs_with_friction import FrictionBounds
+from verification.coupling.sections import (
+    AS_ABOVE,
+    few_methods,
+    next_run,
+    of,
+    paste,
+    paste_and_quote,
+    which_body_and_theta,
+    which_method,
+)
+from verification.coupling.seen import LogBound, SeenLog
+from verification.show.numbers import NONE, rounded
+from verification.show.parts import Cell, Note, Quantity, Section, Sections, Table, closing, section, table
+
+#: Columns of all logs together that are shown; the document holds every one.
+MOST_COLUMNS = 8
+
+#: Words for kinds of residuals; the others are called by their names.
+RESIDUALS = {"assumed": "taken as absolute", "drop": "over the first or largest one", "previous": "over |x|"}
+
+
+@of.register
+def _of_run(run: OneRun, found: Advice) -> Iterator[Section]:
+    yield _assumed(run)
+    yield from of_a_run(run)
+    if found.roles:
+        yield from which_body_and_theta(found)
+        yield from which_method(found)
+        yield from paste_and_quote(found)
+    again = (
+        f"ndtheory advise run {'--tied ' * found.tied}{'--friction ' * run.rubs}--theta {{}} --ratio R (R: its ratio)"
+    )
+    yield _end(run, found, again)
+
+
+@of.register
+def _of_logs(logs: Logs, found: Advice) -> Iterator[Section]:
+    yield _assumed(logs)
+    yield from of_logs(logs)
+    if found.roles and any(row.bound for row in found.methods):
+        yield paste(found, few_methods(found))
+    elif found.roles:
+        yield from which_method(found)
+        yield paste(found)
+    yield _end(
+        logs, found, AS_ABOVE if found.roles else "a run with theta = {0}; then this again plus --log LOG --theta {0}"
+    )
+
+
+def _end(runs: Runs, found: Advice, again: str) -> Section:
+    theta = f"{runs.next.theta:g}"
+    then = f"no run; keep theta = {theta}" if runs.next.kept and not found.roles else again.format(theta)
+    return closing("a bound of rho with friction, or that a reading is the right one", then=then)
+
+
+def _assumed(runs: Runs) -> Section:
+    """The assumption under which runs are read, before all else."""
+    free = not runs.kind.tied and not runs.rubs
+    otherwise = " With friction add --friction." if free else ""
+    return section("assumed", "", Note(f"Assumed: {runs.assumes}.{otherwise}", 0))
+
+
+def of_a_run(run: OneRun) -> Sections:
+    """The readings of a run as values of rho, and the run to make next."""
+    given = (
+        f"theta = {float(run.theta):.4g}; the residual |Tg - g| is multiplied by {float(run.ratio):.4g} in each step"
+    )
+    notes = (
+        f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.",
+        "A residual that rises and falls has no steady ratio: give 1.",
+        "For the relative residual |Tg - g|/|Tg| that coupling libraries log, use --log.",
+    )
+    said = section("rho", "WHAT DOES THE RUN SAY OF RHO?", *notes, _readings(run.readings))
+    return (said, *_with_friction(run.friction_bounds), next_run(run.next))
+
+
+def of_logs(found: Logs) -> Sections:
+    """The values of rho that each log and all logs together allow, and the run to make next."""
+    read = [_readings(found.readings)] if found.readings else []
+    notes = [f"Aitken's {log.factors.says}." for log in found.accelerated if log.factors is not None]
+    if not read and any(log.stays for log in found.logs):
+        notes.append("Nothing by itself: a level is about where theta begins to diverge, or where contact changes.")
+    elif not read and found.logs:
+        notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
+    elif not read and not notes:
+        notes.append("Nothing: residuals show rho only where the relaxation is constant.")
+    if found.logs and not found.decided and not found.next.kept:
+        notes.append("A few vectors of a run decide more than its log: ndtheory advise vectors --help.")
+    if found.interval.contradiction is not None:
+        notes.append(f"CONTRADICTION: {found.interval.contradiction}.")
+    else:
+        notes += _bound("least", found.interval.lo, found.logs) + _bound("most", found.interval.hi, found.logs)
+    return (
+        _seen(found.logs, found.accelerated),
+        section("rho", "WHAT DO THEY SAY OF RHO?", *read, *notes),
+        *_with_friction(found.friction_bounds),
+        next_run(found.next),
+    )
+
+
+def _seen(logs: Sequence[SeenLog], accelerated: Sequence[Accelerated]) -> Section:
+    """The logs, column by column."""
+    parts: list[Note | str] = []
+    room = MOST_COLUMNS
+    for log in logs:
+        parts.append(f"theta = {float(log.theta):.4g}, {log.form}, {log.file}")
+        for column in log.columns[:room]:
+            parts.append(Note(f"{column.name}, {RESIDUALS.get(column.residual, column.residual)}: {column.says}", 4))
+        room -= len(log.columns[:room])
+        parts += [Note(words, 4) for words in log.notes]
+    left = sum(len(log.columns) for log in logs) - MOST_COLUMNS
+    if left > 0:
+        parts.append(f"and {left} columns more, see --json")
+    for one in accelerated:
+        parts.append(f"{one.accelerator}, {one.form}, {one.file}")
+        parts += [Note(words, 4) for words in (one.says if one.factors is None else one.counted, *one.notes)]
+    if logs:
+        steps = " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
+        parts.append(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}.")
+    return section("logs", "WHAT DO THE LOGS SHOW?", *parts)
+
+
+def _readings(readings: Sequence[RunReading]) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for reading in readings:
+        low = reading.lo
+        rho = NONE if low is None else Quantity(float(low), f">= {rounded(low, 4, up=False)}")
+        rows.append((reading.kind, rho, reading.says))
+    return table(("reading", "rho", "if it is the right one"), rows)
+
+
+def _bound(which: str, bound: LogBound | None, logs: Sequence[SeenLog]) -> list[str]:
+    if bound is None:
+        return []
+    source = f"theta = {float(bound.log.theta):.4g}: {bound.says}" if len(logs) > 1 else bound.says
+    value = rounded(float(bound.value), 4, up=which == "most")
+    return [f"rho is at {which} {value} given {bound.assumes} ({source})"]
+
+
+def _with_friction(bounds: FrictionBounds | None) -> Sections:
+    """Bounds that hold with friction; nothing without friction."""
+    if bounds is None:
+        return ()
+    said = []
+    if bounds.image is not None:
+        image = rounded(bounds.image, 3, up=False)
+        theorem = "sqrt(rho) R, with 2 R = s + sqrt(s^2 + 4 kappa_2) and s = sqrt(rho) + kappa_1"
+        said.append(f"The Lipschitz constant of T in the norm (5.21) is at least {image}; it is at most {theorem}.")
+    if bounds.eigenvalue is not None and bounds.theta is not None and bounds.rate is not None:
+        least, most = (rounded(end, 3, up=up) for end, up in zip(bounds.eigenvalue, (False, True), strict=True))
+        gain = rounded(1 - bounds.rate, 3, up=False)
+        near = f"Near the solution of the run at theta = {bounds.theta:.4g}, if contact does not change there, its"
+        words = f"slowest mode has |1 + lambda| from {least} to {most}, and a smaller theta' takes at most"
+        said.append(f"{near} {words} 1 - {gain} theta'/{bounds.theta:.4g} a step.")
+    return (section("with friction", "WHAT IS PROVED WITH FRICTION?", *(said or ["Nothing."])),)
