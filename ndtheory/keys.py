@@ -59,6 +59,8 @@ class Key:
         From the value of the field to the value of the key.
     type : str
         Its type, where that does not follow from the annotation.
+    table : type, optional
+        The class whose keys stand in the value, where that does not follow from the annotation.
     spread : bool
         True if the value is a part whose keys stand among those of the result.
     """
@@ -71,6 +73,7 @@ class Key:
     name: str = ""
     of: Callable[[Any], Any] | None = None
     type: str = ""
+    table: Any = None
     spread: bool = False
     order: int = field(default_factory=lambda: next(_order))
 
@@ -235,7 +238,8 @@ def rows(cls: type) -> tuple[Row, ...]:
 
 def _rows(cls: type) -> Iterator[Row]:
     for attribute, one in keys(cls).items():
-        kind, inside = (one.type, None) if one.type else named_type(annotation(cls, attribute))
+        inside = None if getattr(one.table, "part", "") else one.table
+        kind, inside = (one.type, inside) if one.type else named_type(annotation(cls, attribute))
         name = one.name or attribute
         if one.spread:
             yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,)),)
@@ -284,7 +288,7 @@ def parts(cls: type) -> dict[str, type]:
     """The classes of the named parts that the table of a class refers to, by their names, also those inside them."""
     found: dict[str, type] = {}
     for attribute, one in keys(cls).items():
-        for each in _classes(annotation(cls, attribute)) if not one.type else ():
+        for each in _classes(one.table if one.type else annotation(cls, attribute)):
             if each.part not in found:
                 found |= {each.part: each} if each.part else {}
                 found |= {name: one for name, one in parts(each).items() if name not in found}

@@ -17,6 +17,7 @@ from ndtheory.keys import INCLUDED, Row
 from ndtheory.texts import did_you_mean
 from verification import registry
 from verification.document import Document
+from verification.problem.specs import ProblemSpec
 
 JsonSchema = dict[str, Any]
 
@@ -37,8 +38,8 @@ HEADER = (
     Row(keys=("problem",), type="Problem", says="what the result is about", absent="where that is no problem file"),
 )
 
-#: How the type of an object begins that may be a list of a part instead.
-EITHER = "object, or list of "
+#: What stands in the type of a part, or a list of them, between both.
+EITHER = ", or list of "
 
 #: A reference of the site: its role, its text where it has one, its target.
 _REFERENCE = re.compile(r"\{(\w+)\}`(?:([^`<]+) <[^`>]+>|([^`]+))`")
@@ -54,7 +55,8 @@ def tables() -> dict[str, tuple[Row, ...]]:
     }
     registry.load("documents", "")
     classes = {table: each for each in subclasses(Document) if keys.keys(each) and (table := each.key_table())}
-    named = {name: each for cls in classes.values() for name, each in keys.parts(cls).items()}
+    named = {name: each for cls in (*classes.values(), ProblemSpec) for name, each in keys.parts(cls).items()}
+    named[ProblemSpec.part] = ProblemSpec
     written = [name for name in found if name.startswith("ndtheory.")]
     made = {name: HEADER + keys.rows(cls) for name, cls in classes.items()}
     parts = {name: keys.rows(cls) for name, cls in named.items()}
@@ -177,9 +179,7 @@ def _object(table: str) -> JsonSchema:
 
     for _, key, row in rows(table):
         value = objects[key] = _empty()
-        if row.type.startswith(EITHER):
-            value |= {"type": ["object", "array"], "items": _value(row.type.removeprefix(EITHER))}
-        elif row.type.endswith("object"):
+        if row.type.endswith("object"):
             for _ in range(row.type.count("list of ")):
                 value = {"type": "array", "items": value}
         else:
@@ -197,6 +197,9 @@ def _empty() -> JsonSchema:
 
 def _value(kind: str) -> JsonSchema:
     """Return the schema of a value by the type in its row."""
+    one, either, listed = kind.partition(EITHER)
+    if either:
+        return {"anyOf": [_value(one), {"type": "array", "items": _value(listed)}]}
     outer, _, inner = kind.partition(" of ")
     if outer == "list":
         return {"type": "array", "items": _value(inner)}

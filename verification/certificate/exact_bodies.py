@@ -59,7 +59,7 @@ class ExactBody:
         NotExact
             An element that computes in doubles, or entries that are not of ordinary size.
         """
-        if problem.contact.lines:
+        if problem.several:
             raise NotExact("the contacts are tables [[contact]]")
         spec: BodySpec = getattr(problem, body.name)
         points, mesh = exact_points(spec, body), body.mesh

@@ -104,7 +104,7 @@ def load_problem(
 ) -> Problem:
     """The problem of a file, changed by the options: first --set, then the others."""
     from verification.problem import ProblemError, load
-    from verification.problem.reading import takes_theta
+    from verification.problem.readers import takes_theta
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
     problem = load(file).with_keys({**keys, **chosen})

@@ -22,7 +22,7 @@ from verification.coupling.seen_moduli import Corners, ModuliRole, SeenModuli, S
 from verification.coupling.sides import SeenMatrices
 from verification.coupling.snippets import SNIPPETS, CouplingScheme, precice_acceleration
 from verification.coupling.spectrum import SeenVectors
-from verification.problem.reading import takes_theta
+from verification.problem.readers import takes_theta
 from verification.show.numbers import NONE, count, figures, near_one, rounded
 from verification.show.parts import (
     Block,
@@ -147,7 +147,7 @@ def _which_body(found: Advice) -> Section:
             away = found.chosen(other)[1]
             said.append(f"against {near_one(away)} with the roles exchanged, {in_steps(away)}")
         neumann, contact = found.words(found.neumann_body), found.words(3 - found.neumann_body)
-    if found.problem is not None and found.problem.contact.lines:
+    if found.problem is not None and found.problem.several:
         said.append(f"Solvers of {neumann} read forces and write displacements, those of {contact} the reverse.")
     else:
         said.append(f"{neumann}'s solver reads forces and writes displacements, {contact}'s the reverse.".capitalize())
@@ -302,7 +302,7 @@ def _friction(found: Advice) -> Iterator[Section]:
         if role.friction_threshold is not None:
             allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
             allowed += f" (here k = {figures(found.friction, 2)})"
-            if found.friction and found.problem is not None and found.problem.contact.varies:
+            if found.friction and found.problem is not None and found.problem.varies:
                 share = figures(role.friction_threshold.value / found.friction)
                 allowed = f"every small theta contracts for less than {share} times the friction along Gamma_c"
             said[_name(found, role.neumann_body)] = allowed
@@ -321,7 +321,7 @@ def _together(said: Mapping[str, str]) -> list[str]:
 
 def _paste(found: Advice, *more: str) -> Section:
     """Lines to paste, and notes on them."""
-    several = found.problem is not None and found.problem.contact.lines
+    several = found.problem is not None and found.problem.several
     said = [] if several else [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."]
     auto = found.best.theta_auto
     if auto is not None and found.theta is not None:
@@ -343,7 +343,7 @@ def _pasted(found: Advice, neumann_body: BodyNumber | None, *notes: str, force: 
     assert found.theta is not None
     rule = [f"These are the roles as they are: {found.advised_exchanged}."] if found.advised_exchanged else []
     problem, method = found.problem, found.method_to_paste
-    several = problem.numbers(neumann_body) if problem and problem.contact.lines and neumann_body else ()
+    several = problem.numbers(neumann_body) if problem and problem.several and neumann_body else ()
     file = problem is not None
     return pasted(neumann_body, found.theta, *rule, *notes, method=method, file=file, force=force, several=several)
 

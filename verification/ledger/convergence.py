@@ -243,7 +243,7 @@ class RunsOfLevel:
                 k = Fraction(min(c.value for c in thresholds if c is not None) / 2).limit_denominator(10**9)
                 steps = 300 if self.level == "quick" else 20_000
                 iteration = replace(problem.iteration, max_iterations=steps)
-                problem = replace(problem, contact=replace(problem.contact, friction=k), iteration=iteration)
+                problem = replace(problem.rubbing(k), iteration=iteration)
                 measured = measured.with_friction(float(k))
             constants = measured.constants()
             assert constants is not None
@@ -262,7 +262,7 @@ class RunsOfLevel:
             threshold = measured.friction_threshold
             if threshold is not None and float(problem.contact.friction) > threshold.value / 2:
                 k = Fraction(threshold.value / 2).limit_denominator(10**6)
-                problem = replace(problem, contact=replace(problem.contact, friction=k))
+                problem = problem.rubbing(k)
                 measured = measured.with_friction(float(k))
             constants = measured.energy_constants()
             assert constants is not None
