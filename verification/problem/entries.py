@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, field
+from fractions import Fraction
 from typing import Any, TypeVar
 
 from ndtheory import keys
@@ -171,7 +172,10 @@ def _inside(value: Any, counting: bool) -> Any:
     if isinstance(value, Mapping):
         kind = Spread if isinstance(value, Spread) else dict
         return kind((name, _inside(each, counting)) for name, each in value.items())
-    return tuple(_inside(each, counting) for each in value) if isinstance(value, tuple) else value
+    if not isinstance(value, tuple):
+        return value
+    each = tuple("free" if v is None else _inside(v, counting) for v in value)
+    return each[0] if len(value) == 1 and isinstance(value[0], Fraction | None) else each  # a vector of a bar
 
 
 def entries(cls: Any) -> dict[str, Entry]:

@@ -34,16 +34,8 @@ _HERE = "value"
 class Problem(ProblemSpec):
     """A validated problem; see the problem file in the documentation.
 
-    Two problems are equal where all but their source is; :attr:`digest` compares only what changes a number.
-
-    Attributes
-    ----------
-    source : str
-        The file it came from, or ``<dict>``; errors name it.
-    units : read-only mapping
-        Labels ``length`` and ``stress``.
-    length : Fraction
-        L of the norm ``|v|^2/L^2 + |grad v|^2``.
+    Two problems are equal where all but their ``source`` is, the file that errors name; :attr:`digest` compares only
+    what changes a number.
 
     Examples
     --------
@@ -114,18 +106,11 @@ class Problem(ProblemSpec):
 
         Parameters
         ----------
-        young, poisson, cells, .. : pair
-            Keys of a body, for body 1 and body 2; None leaves a body as it is.
-        friction, law, radius, gap, neumann_body, theta, relaxation, tolerance, max_iterations, title, ..
-            Keys of ``[contact]``, ``[iteration]`` or of no table, as in the problem file; None leaves a value as it is.
-            Where there are more than two bodies, ``neumann_body`` is 1 for all bodies that have the role of body 1, and
-            2 for the others.  Friction may also be a function k(s) of the distance along Gamma_c from its left end,
-            which is read at the contact nodes of rectangles; for mesh files give it to :func:`verification.build`.
-            Momentum takes its step from rho: without a theta it sets theta to ``"auto"``.
-
-        Returns
-        -------
-        Problem
+        values
+            Keys of ``[contact]``, of ``[iteration]`` or of no table; keys of a body as pairs, for body 1 and body 2.
+            None leaves a value as it is.  With several bodies ``neumann_body`` is 1 for those with the role of body 1.
+            Friction may be a function k(s) of the distance along Gamma_c from its left end, read at the contact nodes
+            of rectangles (for mesh files: :func:`verification.build`).  Momentum without a theta sets it to ``"auto"``.
 
         Raises
         ------

@@ -13,29 +13,9 @@ from typing import Any, Literal, Self
 
 from ndtheory.keys import Part, key, says
 from ndtheory.moduli import Moduli
+from verification.problem import readers
 from verification.problem.entries import EMPTY, REQUIRED, At, Entries, ReadOnly, Spread, entry, read_table
-from verification.problem.readers import (
-    SIDES,
-    Components,
-    Theta,
-    at_least_one,
-    by_side,
-    by_surface,
-    coefficient,
-    factor,
-    listed,
-    names,
-    plane,
-    poisson,
-    positions,
-    roles,
-    sha256,
-    side_list,
-    takes_theta,
-    tolerance,
-    two_bodies,
-    vector,
-)
+from verification.problem.readers import SIDES, Components, Theta
 from verification.problem.tables import (
     ProblemError,
     Unfit,
@@ -120,7 +100,7 @@ def _mesh(value: Any, at: At) -> MeshFile:
     digest = None
     if isinstance(value, Mapping):
         inside = at.inside(value)
-        value, digest = inside.take("path", text), inside.take("sha256", sha256)
+        value, digest = inside.take("path", text), inside.take("sha256", readers.sha256)
         inside.close()
     path = (Path() if at["source"] == "<dict>" else Path(at["source"]).parent) / text(value)
     try:
@@ -161,19 +141,13 @@ class SidePart(Entries):
 def _parts(value: Any, at: At) -> dict[str, SidePart]:
     """Read parts of sides, each with its own name."""
     table, known, parts = at.inside(value), SIDES.get(at["shape"]), {}
-    for name in names(table):
+    for name in readers.names(table):
         if at["dimension"] == 1:
             raise table.refuse(name, None, "the side of a bar is a point: it has no parts")
         if known is not None and name in known:
             raise table.refuse(name, None, "needed a name that no side has; known here: " + ", ".join(known))
         parts[name] = read_table(SidePart, table.table(name, required=True), sides=known)
     return parts
-
-
-def _written(values: Components | None) -> Any:
-    """A vector, None as ``free``; one of a single component as a number."""
-    named = tuple("free" if v is None else v for v in values or ())
-    return named[0] if len(named) == 1 else named
 
 
 _elastic = lambda at: at["shape"] != "rigid"
@@ -188,10 +162,9 @@ class Loads(Entries):
         None,
         EMPTY,
         "length",
-        reader=lambda value, at: by_side(value, at, free=True),
+        reader=lambda value, at: readers.by_side(value, at, free=True),
         only=_elastic,
         initial=ReadOnly(),
-        write=lambda loads: {side: _written(values) for side, values in loads.prescribed.items()},
         type="map of vector",
         order=LAST,
     )
@@ -200,10 +173,9 @@ class Loads(Entries):
         None,
         EMPTY,
         "stress",
-        reader=by_side,
+        reader=readers.by_side,
         only=_elastic,
         initial=ReadOnly(),
-        write=lambda loads: {side: _written(values) for side, values in loads.traction.items()},
         type="map of vector",
         order=LAST,
     )
@@ -212,10 +184,9 @@ class Loads(Entries):
         None,
         lambda at: at["kept"],
         "stress/length",
-        reader=vector,
+        reader=readers.vector,
         only=_elastic,
         initial=(),
-        write=lambda loads: _written(loads.body_force),
         type="vector",
         order=LAST,
     )
@@ -229,8 +200,8 @@ _NO_POISSON = "a bar has no Poisson ratio; leave it out in one dimension"
 
 def _cells(value: Any, at: At) -> tuple[int, ...]:
     """Read numbers of cells."""
-    pair = several(at_least_one, 2, "two whole numbers >= 1, along x and y")
-    cells = pair(value) if at["dimension"] == 2 else (at_least_one(value),)
+    pair = several(readers.at_least_one, 2, "two whole numbers >= 1, along x and y")
+    cells = pair(value) if at["dimension"] == 2 else (readers.at_least_one(value),)
     if math.prod(cells) > MOST_CELLS:
         raise Unfit(f"needed at most {MOST_CELLS} cells")
     return cells
@@ -276,7 +247,7 @@ class BodySpec(Loads):
         reader=_cells,
         initial=None,
         only=lambda at: _elastic(at) and _drawn(at),
-        write=lambda body: _written(body.cells),
+        write=lambda body: body.cells if body.shape == "rectangle" else body.cells and body.cells[0],
         type="free",
         unit="1",
     )
@@ -290,7 +261,7 @@ class BodySpec(Loads):
     )
     young: Fraction = entry(
         "$E > 0$; with a mesh file also a table by its named surfaces",
-        reader=lambda value, at: by_surface(value, at, positive),
+        reader=lambda value, at: readers.by_surface(value, at, positive),
         initial=Fraction(0),
         only=_elastic,
         write=lambda body: _of_surfaces(body, 0) or body.young or None,
@@ -300,7 +271,7 @@ class BodySpec(Loads):
     )
     poisson: Fraction = entry(
         r"$-1 < \nu < 1/2$, in plane stress $-1/2 < \nu \le 1/2$; or a table like that of `young`",
-        reader=lambda value, at: by_surface(value, at, poisson(at)),
+        reader=lambda value, at: readers.by_surface(value, at, readers.poisson(at)),
         initial=Fraction(0),
         only=lambda at: _elastic(at) and (at["dimension"] == 2 or _NO_POISSON),
         write=lambda body: _of_surfaces(body, 1) or (body.poisson if body.shape in ("rectangle", "mesh") else None),
@@ -318,7 +289,7 @@ class BodySpec(Loads):
     )
     fixed: tuple[str, ...] = entry(
         'sides with $u = 0$, as `["bottom"]`',
-        reader=side_list,
+        reader=readers.side_list,
         default=(),
         only=_elastic,
         counts=lambda sides: tuple(sorted(sides)),
@@ -408,9 +379,9 @@ class Profile:
 def _friction(value: Any, at: At) -> tuple[Fraction, Profile | None]:
     """Read a coefficient, or a table of it along Gamma_c: the largest one, and how it varies."""
     if not isinstance(value, Mapping) or not value:
-        return coefficient(value), None
+        return readers.coefficient(value), None
     inside = at.inside(value)
-    s, k = inside.take("s", positions), inside.take("k", listed(coefficient))
+    s, k = inside.take("s", readers.positions), inside.take("k", readers.listed(readers.coefficient))
     inside.close()
     if len(s) != len(k):
         raise inside.refuse("k", list(k), f"needed as many values as s has, {len(s)}")
@@ -438,7 +409,7 @@ class ContactSpec(Entries):
 
     bodies: tuple[int, int] = entry(
         "in tables `[[contact]]`: the numbers of two bodies",
-        reader=two_bodies,
+        reader=readers.two_bodies,
         only=lambda at: at["several"],
         initial=(1, 2),
         absent="in a single table `[contact]`: they are 1 and 2",
@@ -493,8 +464,8 @@ class Settings(Entries):
     theta: Theta = entry(
         r'relaxation factor, $0 < \theta < 1$; or `"auto"`: the proved theta, unless none is proved or it is predicted'
         " to need more than twice the steps of the predicted one. Not used by momentum",
-        factor,
-        lambda at: Fraction(1, 2) if takes_theta(at.table.get("relaxation")) else "auto",
+        readers.factor,
+        lambda at: Fraction(1, 2) if readers.takes_theta(at.table.get("relaxation")) else "auto",
         "1",
         initial=Fraction(1, 2),
         shown="1/2",
@@ -509,7 +480,7 @@ class Settings(Entries):
         r"the run ends when $\lvert\lvert\lvert Tg - g\rvert\rvert\rvert$ is at most this part of the larger of"
         r" $\lvert\lvert\lvert g\rvert\rvert\rvert$ and $\lvert\lvert\lvert Tg\rvert\rvert\rvert$, in a state"
         " of contact",
-        lambda value: float(tolerance(value)),
+        lambda value: float(readers.tolerance(value)),
         1e-9,
         "1",
         type="exact",
@@ -517,7 +488,7 @@ class Settings(Entries):
     max_iterations: int = entry(
         "the run ends after so many steps. Every iterate is kept, so there is a largest number: they may fill 2 GB,"
         " which is 624,000 steps at 25 contact nodes",
-        at_least_one,
+        readers.at_least_one,
         500,
         "1",
     )
@@ -540,7 +511,7 @@ class IterationSpec(Settings):
     neumann_bodies: tuple[int, ...] = entry(
         "with tables `[[contact]]`, instead of `neumann_body`: the numbers of all bodies with the linear problem of"
         " step I, as `[1, 3]`",
-        reader=roles,
+        reader=readers.roles,
         default=lambda at: at["chosen"],
         initial=(),
         only=lambda at: at["several"],
@@ -556,7 +527,7 @@ class IterationSpec(Settings):
 
 def _increments(value: Any, at: At) -> int:
     """Read the number of increments of a step."""
-    if at_least_one(value) + at["before"] > MOST_INCREMENTS:
+    if readers.at_least_one(value) + at["before"] > MOST_INCREMENTS:
         raise Unfit(f"needed at most {MOST_INCREMENTS} increments of all steps")
     return int(value)
 
@@ -605,7 +576,7 @@ class ProblemSpec(Entries):
     dimension: Literal[1, 2] = entry("1 (two bars) or 2 (bodies in the plane)", choice(1, 2), 2, type="integer")
     plane: Literal["strain", "stress"] = entry(
         '`"strain"` for thick bodies, `"stress"` for thin plates; all bodies, in the plane only',
-        plane,
+        readers.plane,
         "strain",
         only=lambda at: at["dimension"] == 2 or "a bar has none; leave it out in one dimension",
         write=lambda problem: problem.plane if problem.dimension == 2 else None,
