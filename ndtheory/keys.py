@@ -66,6 +66,8 @@ class Key:
         From the value of the field to the value of the key.
     type : str
         Its type, where that does not follow from the annotation.
+    table : type, optional
+        The class whose keys stand in the value, where that does not follow from the annotation.
     spread : bool
         True if the value is a part whose keys are keys of the result.
     inside : dict of Key, optional
@@ -80,6 +82,7 @@ class Key:
     name: str = ""
     of: Callable[[Any], Any] | None = None
     type: str = ""
+    table: Any = None
     spread: bool = False
     inside: Mapping[str, Key] = field(default_factory=dict)
     order: int = field(default_factory=lambda: next(_order))
@@ -276,7 +279,8 @@ def rows(cls: type) -> tuple[Row, ...]:
 
 def _rows(cls: type) -> Iterator[Row]:
     for attribute, one in keys(cls).items():
-        kind, inside = (one.type, None) if one.type else named_type(annotation(cls, attribute))
+        inside = None if getattr(one.table, "part", "") else one.table
+        kind, inside = (one.type, inside) if one.type else named_type(annotation(cls, attribute))
         name = one.name or attribute
         if one.inside and not one.type:
             kind = "list of object" if kind.startswith("list") else "object"

@@ -35,7 +35,9 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification.show": "__init__ layout numbers parts",
     },
     "input": {
-        "verification.problem": "__init__ colours examples files reading specification specs steps tables writing"
+        "verification.problem": (
+            "__init__ colours entries examples files readers reading specification specs steps tables writing"
+        )
     },
     "results, extras": {"verification": "document extras schemas"},
     "bodies": {

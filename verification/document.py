@@ -48,7 +48,7 @@ class Document(Value, keys.Part, ABC):
     def to_dict(self) -> dict[str, Any]:
         """Return the document as plain dictionaries, lists and numbers."""
         origin: dict[str, Any] = {} if self.problem is None else {"problem": self.problem.to_dict()}
-        if self.problem is not None and self.problem.contact.lines:
+        if self.problem is not None and self.problem.several:
             origin["colours"] = [list(self.problem.numbers(body)) for body in (1, 2)]
         kind = {"kind": self.kind} if type(self).kind else {}
         head = {"schema": self.schema, "version": __version__, "units": dict(self.units)}

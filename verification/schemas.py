@@ -31,8 +31,8 @@ TYPES: dict[str, JsonSchema] = {
     "free": {"type": ["array", "boolean", "number", "object", "string"]},
 }
 
-#: How the type of an object begins that may be a list of a part instead.
-EITHER = "object, or list of "
+#: What stands in the type of a part, or a list of them, between both.
+EITHER = ", or list of "
 
 #: A reference of the site: its role, its text where it has one, its target.
 _REFERENCE = re.compile(r"\{(\w+)\}`(?:([^`<]+) <[^`>]+>|([^`]+))`")
@@ -185,9 +185,7 @@ def _object(table: str) -> JsonSchema:
 
     for _, key, row in rows(table):
         value = objects[key] = _empty()
-        if row.type.startswith(EITHER):
-            value |= {"type": ["object", "array"], "items": _value(row.type.removeprefix(EITHER))}
-        elif row.type.endswith("object"):
+        if row.type.endswith("object"):
             for _ in range(row.type.count("list of ")):
                 value = {"type": "array", "items": value}
         else:
@@ -205,6 +203,9 @@ def _empty() -> JsonSchema:
 
 def _value(kind: str) -> JsonSchema:
     """Return the schema of a value by the type in its row."""
+    one, either, listed = kind.partition(EITHER)
+    if either:
+        return {"anyOf": [_value(one), {"type": "array", "items": _value(listed)}]}
     outer, _, inner = kind.partition(" of ")
     if outer == "list":
         return {"type": "array", "items": _value(inner)}

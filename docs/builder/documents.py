@@ -1,9 +1,14 @@
-"""The tables of the page on documents, from those of which the schemas are made."""
+"""The tables of keys: those of documents, of which the schemas are made, and those of the problem file."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
+from ndtheory import keys
+from verification.problem.entries import EMPTY, REQUIRED, Entries, Entry, entries
+from verification.problem.specs import BodySpec, ContactSpec, IterationSpec, ProblemSpec, StepSpec
+from verification.problem.writing import plain, value
 from verification.schemas import INCLUDED, TYPES, Row, tables
 
 #: Words in types that are not names of parts.
@@ -28,3 +33,37 @@ def line(row: Row) -> str:
 def table(name: str) -> str:
     """The table of a document or of a part, in Markdown."""
     return "\n".join(["| key | type | unit | meaning |", "|---|---|---|---|", *map(line, tables()[name])])
+
+
+#: The tables of the problem file as the page on it names them.
+FILE = {
+    "problem file": ProblemSpec,
+    "[body1]": BodySpec,
+    "[contact]": ContactSpec,
+    "[iteration]": IterationSpec,
+    "[[step]]": StepSpec,
+}
+
+
+def file_table(name: str) -> str:
+    """A table of the problem file, in Markdown."""
+    return "\n".join(["| key | unit | meaning | default |", "|---|---|---|---|", *_file_lines(FILE[name])])
+
+
+def _file_lines(cls: type, above: str = "", default: str = "") -> Iterator[str]:
+    for name, one in entries(cls).items():
+        if not (one.read or one.reader or one.shown):  # it has a table of its own
+            continue
+        key = keys.keys(cls)[name]
+        inside = key.table or keys.named_type(keys.annotation(cls, name))[1]
+        if isinstance(inside, type) and issubclass(inside, Entries) and name != "parts":
+            yield from _file_lines(inside, f"{above}{name}.", one.shown)
+        else:
+            yield f"| `{above}{name}` | {key.unit} | {key.says} | {default or _default(one)} |"
+
+
+def _default(one: Entry) -> str:
+    """The default of a key in words."""
+    if one.shown or one.default in (REQUIRED, EMPTY, None, ()) or callable(one.default):
+        return one.shown
+    return f"`{value(plain(one.default))}`"

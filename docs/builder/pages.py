@@ -19,6 +19,7 @@ import verification as vf
 from builder import course, documents, equations, notebooks, slides, widgets
 from builder.references import References
 from verification import schemas
+from verification.problem import specs
 
 
 class Proofs(ProofDomain):
@@ -66,13 +67,16 @@ def say_needs(app: Sphinx, page: str, source: list[str]) -> None:
 
 
 class KeysDirective(SphinxDirective):
-    """``{keys} ndtheory.run/1``: the table of the keys of a document, or of a part."""
+    """``{keys} ndtheory.run/1``: the table of the keys of a document, of a part, or of a table of the problem file."""
 
     required_arguments = 1
     final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
         name = self.arguments[0]
+        if name in documents.FILE:
+            self.env.note_dependency(specs.__file__)
+            return list(self.parse_text_to_nodes(documents.file_table(name)))
         if name not in schemas.tables():
             raise self.error(f"keys {name!r}: needed one of {'; '.join(schemas.tables())}")
         self.env.note_dependency(str(Path(schemas.__file__).with_suffix(".toml")))

@@ -62,7 +62,7 @@ def test_a_misspelt_value_of_a_file_is_answered_alike(call, write, key, value, m
         ("young=1", "did you mean 'body1.young' or 'body2.young'?"),
         ("relaxation=newton", "did you mean 'iteration.relaxation'?"),
         ("stress=Pa", "did you mean 'units.stress'?"),
-        ("top=[0,1]", "known here: dimension, title, units, plane, body1, body2, contact, iteration, step, norm"),
+        ("top=[0,1]", "known here: title, dimension, plane, units, norm, body1, body2, contact, iteration, step"),
     ],
 )
 def test_a_key_without_its_table_is_answered_with_the_tables_that_have_it(call, write, pair, meant):

@@ -98,11 +98,13 @@ class Reader:
     def value(self, name: str, path: str, kind: str, value: Any) -> None:
         if value is None:
             return
-        if kind.startswith(schemas.EITHER):
-            kind = f"list of {kind.removeprefix(schemas.EITHER)}" if isinstance(value, list) else "object"
+        if schemas.EITHER in kind:
+            one, _, several = kind.partition(schemas.EITHER)
+            kind = f"list of {several}" if isinstance(value, list) else one
         if kind.startswith(("list of ", "map of ")):
-            for member in value if isinstance(value, list) else value.values():
-                self.value(name, path, kind.partition(" of ")[2], member)
+            of_map = isinstance(value, dict)
+            for member in value.values() if of_map else value:
+                self.value(name, f"{path}.*" if of_map else path, kind.partition(" of ")[2], member)
         elif kind in schemas.tables():
             self.object(kind, "", value)
         elif kind == "object":

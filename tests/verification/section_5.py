@@ -301,7 +301,7 @@ def thetas_for(case: Case, random: np.random.Generator) -> list[float]:
 
 def with_friction(case: Case, k: float) -> Case:
     problem = case.pair.problem
-    return Case(replace(problem, contact=replace(problem.contact, friction=Fraction(k))))
+    return Case(problem.rubbing(Fraction(k)))
 
 
 def threshold(case: Case) -> float | None:

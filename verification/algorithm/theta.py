@@ -14,7 +14,7 @@ from ndtheory.number import Numeric
 from verification.algorithm.relaxation import Rule, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
-from verification.problem.specs import read_theta
+from verification.problem.readers import read_theta
 
 #: A theta chosen for the user stays below 1 by this much, however soft the contact body.
 CLOSEST_TO_ONE = 1 - 1e-6

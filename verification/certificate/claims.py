@@ -236,7 +236,7 @@ def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any
 
     Coordinates of a mesh file are the doubles that were read from it.
     """
-    if problem.contact.lines:
+    if problem.several:
         raise problem.refuse("contact", None, "needed one table [contact]: a certificate is about two bodies")
     for name, spec in (("body1", problem.body1), ("body2", problem.body2)):
         if spec.materials:

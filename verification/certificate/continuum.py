@@ -178,7 +178,7 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
     law, friction = problem.contact.law, problem.contact.friction
     if friction and LAWS[law].outside:
         raise refuse("contact.law", law, f'needed "nonlocal": the theorem does not apply to the {LAWS[law].label} law')
-    if problem.contact.lines:
+    if problem.several:
         raise refuse("contact", None, "needed one table [contact], and two bodies")
     if problem.contact.surface is not None:
         raise refuse("contact.surface", list(problem.contact.surface), "needed an interval, or neither key")

@@ -60,7 +60,7 @@ class ExactBody:
         NotExact
             An element that computes in doubles, or entries that are not of ordinary size.
         """
-        if problem.contact.lines:
+        if problem.several:
             raise NotExact("the contacts are tables [[contact]]")
         if why := lacks(body.mesh, "proofs"):
             raise NotExact(f"{body.name}: {why}")

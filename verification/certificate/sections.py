@@ -46,7 +46,7 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     )
     then = following("certify", "-o", "certificate.json", iteration=True)
     about = f"{found.problem.title}: {nodes} nodes, {len(discrete['weights'])} contact nodes"
-    bodies = f"k = {found.problem.contact.friction_words}, Neumann body {discrete['neumann_body']}"
+    bodies = f"k = {found.problem.friction_words}, Neumann body {discrete['neumann_body']}"
     return (
         section("setting", "", Facts(about), Facts(bodies)),
         section("proved", "WHAT IS PROVED?", *claim),
@@ -96,7 +96,7 @@ def continuum(found: ContinuumCertificate) -> Sections:
     radius = [] if problem.contact.radius is None else [f"r = {float(problem.contact.radius):g} {length}"]
     number = problem.iteration.neumann_body
     body = f"Neumann body: {number} ({PLACES[number]})"
-    friction = ", ".join([f"k = {problem.contact.friction_words}", *radius])
+    friction = ", ".join([f"k = {problem.friction_words}", *radius])
     return (
         section("setting", "", Facts(f"{problem.title}: the continuous problem, no mesh"), Facts(body, (friction,))),
         _used(found, document["constants"], f"sqrt({stress}/{length})", f"sqrt({length}/{stress})"),

@@ -108,7 +108,7 @@ def load_problem(
     """The problem of a file, changed by the options: first --set, then the others."""
     from verification.problem import ProblemError
     from verification.problem import load as read
-    from verification.problem.reading import takes_theta
+    from verification.problem.readers import takes_theta
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
     problem = read(file).with_keys({**keys, **chosen})

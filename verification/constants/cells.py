@@ -93,11 +93,10 @@ def halved_cells(problem: Problem) -> FacingLayers:
     """
     if problem.dimension == 1:
         raise NoCells("bars have no waves along Gamma_c")
-    if problem.contact.named:
-        more = (
-            "the contacts are tables [[contact]]" if problem.contact.lines else "Gamma_c is a named line, of any shape"
+    if problem.named:
+        raise NoCells(
+            "the contacts are tables [[contact]]" if problem.several else "Gamma_c is a named line, of any shape"
         )
-        raise NoCells(more)
     bodies = {name: getattr(problem, name) for name in ("body1", "body2")}
     for (name, body), side in zip(bodies.items(), SIDES, strict=True):
         if body.shape != "rectangle":

@@ -305,7 +305,7 @@ class Advice(Document):
         """
         if self.theta is None:
             raise ValueError(self.why_no_theta)
-        if self.problem is not None and self.problem.contact.lines:
+        if self.problem is not None and self.problem.several:
             raise self.problem.refuse("contact", None, "the blocks couple two solvers: needed a file with two bodies")
         if self.evidence.kind.parallel:
             raise ValueError("the blocks are for serial coupling: needed advice without parallel")

@@ -20,7 +20,7 @@ from verification.coupling.roles import Role, in_steps
 from verification.coupling.sides import Matrices
 from verification.coupling.snippets import SNIPPETS, CouplingScheme, precice_acceleration
 from verification.coupling.vectors import Vectors
-from verification.problem.reading import takes_theta
+from verification.problem.readers import takes_theta
 from verification.show.numbers import NONE, count, figures, near_one, rounded
 from verification.show.parts import (
     Block,
@@ -143,7 +143,7 @@ def _which_body(found: Advice) -> Section:
             away = found.chosen(other)[1]
             said.append(f"against {near_one(away)} with the roles exchanged, {in_steps(away)}")
         neumann, contact = found.evidence.words(found.neumann_body), found.evidence.words(3 - found.neumann_body)
-    if found.problem is not None and found.problem.contact.lines:
+    if found.problem is not None and found.problem.several:
         said.append(f"Solvers of {neumann} read forces and write displacements, those of {contact} the reverse.")
     else:
         said.append(f"{neumann}'s solver reads forces and writes displacements, {contact}'s the reverse.".capitalize())
@@ -289,7 +289,7 @@ def _friction(found: Advice) -> Iterator[Section]:
     friction = found.evidence.friction
     if friction is None:
         return
-    said, varies = {}, found.problem is not None and found.problem.contact.varies
+    said, varies = {}, found.problem is not None and found.problem.varies
     for role in found.roles:
         allowed, threshold = role.reason.get("friction_threshold", ""), role.friction_threshold
         if threshold is not None and friction and varies:
@@ -314,7 +314,7 @@ def _together(said: Mapping[str, str]) -> list[str]:
 
 def paste(found: Advice, *more: str) -> Section:
     """Lines to paste, and notes on them."""
-    several = found.problem is not None and found.problem.contact.lines
+    several = found.problem is not None and found.problem.several
     said = [] if several else [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."]
     auto = found.best.theta_auto
     if auto is not None and found.theta is not None:
@@ -336,7 +336,7 @@ def pasted_for(found: Advice, neumann_body: BodyNumber | None, *notes: str, forc
     assert found.theta is not None
     rule = [f"These are the roles as they are: {found.advised_exchanged}."] if found.advised_exchanged else []
     problem, method = found.problem, found.method_to_paste
-    several = problem.numbers(neumann_body) if problem and problem.contact.lines and neumann_body else ()
+    several = problem.numbers(neumann_body) if problem and problem.several and neumann_body else ()
     file = problem is not None
     return pasted(neumann_body, found.theta, *rule, *notes, method=method, file=file, force=force, several=several)
 

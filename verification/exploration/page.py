@@ -205,7 +205,7 @@ def explore(
     whole = given.problem if isinstance(given, ContactPair) else given
     if whole is None:
         raise ProblemError("", "", None, "this pair is made from matrices: needed the meshes of both bodies")
-    if whole.contact.lines:
+    if whole.several:
         raise whole.refuse("contact", None, "needed one table [contact]: the page shows two bodies")
     found = _histories(given, whole, progress) if whole.steps else _grid(pair_of(given), whole, progress)
     if path is not None:

@@ -30,7 +30,7 @@ def draw_region(plane: Plane) -> Figure:
     ends = [hi for region in plane.regions.values() for _, hi in region.theta]
     frictions = [k for region in plane.regions.values() for k in region.k]
     left, bottom = 10 ** (-2) * min(ends), 0.1 * min(frictions)
-    varies = plane.problem.contact.varies
+    varies = plane.problem.varies
     highest = max([*frictions, *(p.k for p in plane.points)])
     with styled():
         figure = new_figure(7.2, 7.2)

@@ -71,7 +71,7 @@ class SingularRole(ProblemError):
     def of(cls, problem: Problem, body: Body, other: Body) -> SingularRole:
         """Return the error for a body of a problem, or for bodies with one role; the other one would have the other."""
         error = cls(problem.source, int(body.name[-1]), body.motions.shape[1])
-        if not problem.contact.lines:
+        if not problem.several:
             return error
         name = f"body{_loose(problem, body)[0]}"
         if loose := _loose(problem, other):
@@ -292,7 +292,7 @@ def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
             continue
         if int(body.name[-1]) == problem.iteration.neumann_body:
             raise SingularRole.of(problem, body, next(one for one in bodies.elastic if one is not body))
-        name = f"body{_loose(problem, body)[0]}" if problem.contact.lines else body.name
+        name = f"body{_loose(problem, body)[0]}" if problem.several else body.name
         if problem.dimension == 1:
             needed = "its loads are its contact force, and nothing is left to iterate; `ndtheory solve` takes it"
         elif not dense:
@@ -328,7 +328,7 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         None if mesh is None else _supports(problem, name, mesh)
         for (name, _), mesh in zip(_specs(problem), meshes, strict=True)
     ]
-    nodes, interface = (join_lines if problem.contact.lines else join)(problem, meshes, known, law)
+    nodes, interface = (join_lines if problem.several else join)(problem, meshes, known, law)
     if dense and interface.contact.n > MOST_CONTACT_NODES:
         needed = f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}"
         raise TooManyContactNodes(problem.source, "contact", None, needed)
@@ -342,9 +342,9 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
     for body in bodies.elastic:
         _check_pieces(problem, body, hinged=True)
     if len(bodies.elastic) == 2 and _move_together(bodies):
-        which = "bodies that touch" if problem.contact.lines else "body1 and body2"
+        which = "bodies that touch" if problem.several else "body1 and body2"
         needed = f"{which} can move rigidly together, each held only by the other: fix or prescribe some sides"
-        raise problem.refuse("contact" if problem.contact.lines else "body2", None, needed)
+        raise problem.refuse("contact" if problem.several else "body2", None, needed)
     return bodies
 
 
@@ -493,7 +493,7 @@ def _load(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, interface: Inte
             facets = mesh.sides[prefix + side]
             loaded = facet_weights(mesh, facets)
             for line, x, ends in _lines_on(nodes, interface, own=int(name[-1]) == problem.contact_body):
-                loaded -= _covered(mesh, facets, line, x if problem.contact.named else None, ends)
+                loaded -= _covered(mesh, facets, line, x if problem.named else None, ends)
             if any(force) and loaded.max() <= SAME * extent(mesh):
                 needed = "Gamma_c covers this side: a force there is lost"
                 raise problem.refuse(f"{own}.traction.{side}", list(force), needed)

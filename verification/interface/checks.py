@@ -208,13 +208,13 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
     """Return the greatest depth of a surface node outside Gamma_c inside another body, and where it is drawn."""
     problem, grid = bodies.problem, bodies.interface.contact
     ends, mean = grid.x[[0, -1]], grid.upright.mean(axis=0)
-    gap, named = float(problem.contact.gap), problem.contact.named
+    gap, named = float(problem.contact.gap), problem.named
     lift = gap * mean / np.linalg.norm(mean) if gap else np.zeros(2)  # of body 2
     surfaces: list[list[_Surface]] = [[], []]
     for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), moved, strict=True)):
         if body is not None and u is not None:
             lines = [(nodes, x if named else None, its) for nodes, x, its in bodies.lines_on(body)]
-            members = [body.mesh.surfaces[f"body{j}"] for j in problem.numbers(i + 1)] if problem.contact.lines else []
+            members = [body.mesh.surfaces[f"body{j}"] for j in problem.numbers(i + 1)] if problem.several else []
             each = [body.mesh.cells[cells] for cells in members] or [body.mesh.cells]
             surfaces[i] = [_Surface.of(body.mesh, u + i * lift, lines, cells) for cells in each]
     if not surfaces[0]:

@@ -33,8 +33,7 @@ from verification.interface.matrices import (
 )
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
-from verification.problem.reading import at_least_one, factor, tolerance
-from verification.problem.specs import LEAST_FRICTION
+from verification.problem.readers import LEAST_FRICTION, at_least_one, factor, tolerance
 from verification.problem.tables import TomlTable, choice, label, number, unreadable
 
 #: Largest size of an interface file, and of what it unpacks to: two matrices of 4000 rows, and what else there is.

@@ -27,7 +27,8 @@ from verification.interface.interface import Grid, Interface, Law
 from verification.interface.joining import check_slopes
 from verification.interface.matrices import real_array
 from verification.problem import Problem, Settings
-from verification.problem.specs import MOST_FRICTION, Profile
+from verification.problem.readers import MOST_FRICTION
+from verification.problem.specs import Profile
 from verification.problem.steps import path_warnings
 from verification.value import Value, copied, freeze
 
@@ -120,7 +121,7 @@ class ContactPair(Value):
         if origin is not None and k > MOST_FRICTION:  # a file may not hold every friction
             origin = None
         elif origin is not None and self.interface.varies:
-            origin = replace(origin, contact=origin.contact.rubbing(k))
+            origin = origin.rubbing(k)
         elif origin is not None:
             origin = origin.changed(friction=k)
         return replace(self, friction=k, problem=origin)
@@ -152,7 +153,7 @@ class ContactPair(Value):
         if self.problem is None or largest > MOST_FRICTION:
             return found
         contact = replace(self.problem.contact, friction=largest, profile=profile)
-        return replace(found, problem=replace(self.problem, contact=contact))
+        return replace(found, problem=replace(self.problem, contacts=(contact,)))
 
     def changed(self, **values: Any) -> ContactPair:
         """Return the pair of its problem with other values, which are those of :meth:`verification.Problem.changed`.
@@ -215,7 +216,7 @@ class ContactPair(Value):
             if self.problem is not None:
                 raise SingularRole.of(self.problem, self.contact.mesh_body, self.neumann.mesh_body)
             raise SingularRole(self.source, self.contact_body, self.contact.motions.shape[1])
-        if self.problem is not None and (self.problem.contact.named or not self.interface.one_grid):
+        if self.problem is not None and (self.problem.named or not self.interface.one_grid):
             return pair_from(self.problem.swapped(), law=self.interface.law, like=self)
         if self.problem is not None and self.contact.grid.dimension == 2:
             bodies = [side.mesh_body for side in (self.body1, self.body2)]

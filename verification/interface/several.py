@@ -20,7 +20,7 @@ from verification.interface.friction import OF_TWO
 from verification.interface.interface import Grid, Interface, Law, Stretch
 from verification.interface.joining import check_profile, join
 from verification.problem.specification import Problem
-from verification.problem.specs import Line
+from verification.problem.specs import ContactSpec
 from verification.problem.tables import ProblemError
 from verification.value import Value
 
@@ -114,7 +114,7 @@ def join_lines(
     """Find the lines of all contacts between two unions of bodies; parameters and errors as those of ``join``."""
     joined: list[Interface] = []
     flipped, nodes = [], [[], []]  # type: tuple[list[bool], list[list[Ints]]]
-    for number, line in enumerate(problem.contact.lines, 1):
+    for number, line in enumerate(problem.contacts, 1):
         flipped.append(line.bodies[0] not in problem.numbers(1))
         order = line.bodies[::-1] if flipped[-1] else line.bodies
         parts = []
@@ -132,26 +132,25 @@ def join_lines(
         for of_body, before, start, i in zip(nodes, found, first, order, strict=True):
             if any(np.isin(before + start, earlier).any() for earlier in of_body):
                 needed = f"two contacts share a node of body {i}: needed a side or a part of one for each"
-                raise problem.refuse(f"contact[{number}].surface", list(line.contact.surface or ()), needed)
+                raise problem.refuse(f"contact[{number}].surface", list(line.surface or ()), needed)
             of_body.append(before + start)
-    scales = tuple(float(line.share) for line in problem.contact.lines)
-    law = Blocks(parts=tuple(joined), scales=scales)
+    law = Blocks(parts=tuple(joined), scales=tuple(map(float, problem.shares)))
     return [np.concatenate(each) for each in nodes], _one_after_another(problem, joined, flipped, law)
 
 
 def _join_line(
     problem: Problem,
-    line: Line,
+    contact: ContactSpec,
     order: tuple[int, int],
     meshes: list[Mesh | None],
     known: list[Supports | None],
     law: Law | None,
 ) -> tuple[list[Ints], Interface]:
     """Join two bodies, in the order of the unions to which they belong."""
-    bodies, contact, profile = problem.bodies, line.contact, line.contact.profile
-    if order != line.bodies and contact.surface is not None:
+    bodies, profile = problem.bodies, contact.profile
+    if order != contact.bodies and contact.surface is not None:
         contact = replace(contact, surface=contact.surface[::-1], profile=None)
-    two = replace(problem, body1=bodies[order[0]], body2=bodies[order[1]], contact=contact)
+    two = replace(problem, body1=bodies[order[0]], body2=bodies[order[1]], contacts=(contact,))
     nodes, interface = join(two, meshes, known, law)
     if contact.profile is profile:
         return nodes, interface
@@ -172,7 +171,7 @@ def _one_after_another(problem: Problem, parts: Sequence[Interface], flipped: Se
     shift, lines, grids = 0.0, [], []
     x: list[list[Floats]] = [[], []]
     ends = np.zeros(2, dtype=int)
-    for part, line, turned in zip(parts, problem.contact.lines, flipped, strict=True):
+    for part, line, turned in zip(parts, problem.contacts, flipped, strict=True):
         for positions, grid in zip(x, (part.contact, part.neumann), strict=True):
             positions.append(grid.x - part.contact.x[0] + shift)
         shift = float(x[0][-1][-1]) + float(np.diff(part.contact.x).max())

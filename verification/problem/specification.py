@@ -6,37 +6,25 @@ import hashlib
 import json
 import math
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any, Literal
 
 from ndtheory.number import Numeric
-from verification.problem.reading import read_problem, takes_theta
-from verification.problem.specs import MOST_CELLS, BodySpec, ProblemSpec, read_theta
+from ndtheory.texts import did_you_mean
+from verification.problem.entries import Entries, names
+from verification.problem.readers import read_theta, takes_theta
+from verification.problem.reading import read_problem
+from verification.problem.specs import MOST_CELLS, BodySpec, ContactSpec, IterationSpec, ProblemSpec
 from verification.problem.tables import QUOTED, ProblemError
-from verification.problem.writing import plain, tables, toml
-
-_OF_A_BODY = (
-    *("shape", "mesh", "x", "y", "cells", "young", "poisson", "parts", "fixed", "prescribed", "traction", "body_force"),
-)
-
-#: The keys that enter a digest whether they have their default or another value: those of 0.1.0.  This list never
-#: grows: a later key enters only where it differs from its default, so that the digests of problems without it stay.
-ALWAYS = {
-    "dimension": (),
-    "body1": _OF_A_BODY,
-    "body2": _OF_A_BODY,
-    "contact": ("interval", "friction", "law", "radius", "gap"),
-    "iteration": ("neumann_body", "theta", "relaxation", "tolerance", "max_iterations"),
-    "norm": ("length",),
-}
-
-#: The keys that change no number.
-NEVER = ("title", "units")
+from verification.problem.writing import plain, toml
 
 #: A key by its tables and its name.
 Key = tuple[str, ...]
+
+#: The tables whose keys :meth:`Problem.changed` takes by their names alone.
+TABLES: dict[Key, type[Entries]] = {("contact",): ContactSpec, ("iteration",): IterationSpec, (): ProblemSpec}
 
 #: Stands where a value would, while a key is read.
 _HERE = "value"
@@ -46,16 +34,8 @@ _HERE = "value"
 class Problem(ProblemSpec):
     """A validated problem; see the problem file in the documentation.
 
-    Two problems are equal where all but their source is; :attr:`digest` compares only what changes a number.
-
-    Attributes
-    ----------
-    source : str
-        The file it came from, or ``<dict>``; errors name it.
-    units : read-only mapping
-        Labels ``length`` and ``stress``.
-    length : Fraction
-        L of the norm ``|v|^2/L^2 + |grad v|^2``.
+    Two problems are equal where all but their ``source`` is, the file that errors name; :attr:`digest` compares only
+    what changes a number.
 
     Examples
     --------
@@ -72,7 +52,7 @@ class Problem(ProblemSpec):
 
     def __repr__(self) -> str:
         bodies = " / ".join("rigid" if body.rigid else f"E {float(body.young):g}" for body in self.bodies.values())
-        return f"<Problem: {self.title}, {self.dimension}D, {bodies}, k = {self.contact.friction_words}>"
+        return f"<Problem: {self.title}, {self.dimension}D, {bodies}, k = {self.friction_words}>"
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "<dict>") -> Problem:
@@ -85,10 +65,6 @@ class Problem(ProblemSpec):
         """
         return cls(**vars(read_problem(data, source)))
 
-    def refuse(self, key: str, value: object, needed: str) -> ProblemError:
-        """Return the error for a key of this problem."""
-        return ProblemError(self.source, key, value, needed)
-
     def to_dict(self) -> dict[str, Any]:
         """Return the nested dictionary of the problem file, from which :meth:`from_dict` makes an equal problem.
 
@@ -97,8 +73,7 @@ class Problem(ProblemSpec):
         exact, a text such as ``"1/3"`` elsewhere.  A mesh file is written as its absolute path and the SHA-256 of its
         content, and :meth:`from_dict` refuses a file with other content.
         """
-        written: dict[str, Any] = plain(tables(self))
-        return written
+        return super().to_dict()
 
     def to_toml(self) -> str:
         """Return the text of a problem file (UTF-8) that reads back as an equal problem, wherever it is kept.
@@ -122,50 +97,20 @@ class Problem(ProblemSpec):
         Left out are title, labels of units, source, the places of mesh files (their content counts) and the order of
         sides.  It outlives releases: a key that the problem file gets later counts only where it has no default.
         """
-        data = _without_defaults(self, tables(self))
-        for name in NEVER:
-            data.pop(name, None)
-        for name in (f"body{i}" for i in self.bodies):
-            body = data[name]
-            if "mesh" in body:
-                body["mesh"] = body["mesh"].sha256
-            if "fixed" in body:
-                body["fixed"] = tuple(sorted(body["fixed"]))
-        text = json.dumps(plain(data), sort_keys=True, separators=(",", ":"))
+        data = plain(self.tables(counting=True))
+        text = json.dumps(data, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode("ascii")).hexdigest()
 
-    def changed(
-        self,
-        *,
-        title: str | None = None,
-        young: Sequence[Numeric | None] | None = None,
-        poisson: Sequence[Numeric | None] | None = None,
-        cells: Sequence[int | Sequence[int] | None] | None = None,
-        friction: Numeric | Mapping[str, Any] | Callable[[float], float] | None = None,
-        law: str | None = None,
-        radius: Numeric | None = None,
-        gap: Numeric | None = None,
-        neumann_body: int | None = None,
-        theta: Numeric | None = None,
-        relaxation: str | None = None,
-        tolerance: Numeric | None = None,
-        max_iterations: int | None = None,
-    ) -> Problem:
+    def changed(self, **values: Any) -> Problem:
         """Return the same problem with other values, read and refused like the values of a file.
 
         Parameters
         ----------
-        young, poisson, cells : pair
-            For body 1 and body 2; None leaves a body as it is.
-        friction, law, radius, gap, neumann_body, theta, relaxation, tolerance, max_iterations, title
-            As in the problem file; where there are more than two bodies, ``neumann_body`` is 1 for all bodies that have
-            the role of body 1, and 2 for the others.  Friction may also be a function k(s) of the distance along
-            Gamma_c from its left end, which is read at the contact nodes of rectangles; for mesh files give it to
-            :func:`verification.build`.  Momentum takes its step from rho: without a theta it sets theta to ``"auto"``.
-
-        Returns
-        -------
-        Problem
+        values
+            Keys of ``[contact]``, of ``[iteration]`` or of no table; keys of a body as pairs, for body 1 and body 2.
+            None leaves a value as it is.  With several bodies ``neumann_body`` is 1 for those with the role of body 1.
+            Friction may be a function k(s) of the distance along Gamma_c from its left end, read at the contact nodes
+            of rectangles (for mesh files: :func:`verification.build`).  Momentum without a theta sets it to ``"auto"``.
 
         Raises
         ------
@@ -178,35 +123,33 @@ class Problem(ProblemSpec):
         >>> str(example("section6").changed(friction="1/3").contact.friction)
         '1/3'
         """
-        if callable(friction):
-            friction = self._read_at_nodes(friction)
-        given: dict[Key, Any] = {
-            ("title",): title,
-            ("contact", "friction"): friction,
-            ("contact", "law"): law,
-            ("contact", "radius"): radius,
-            ("contact", "gap"): gap,
-            ("iteration", "neumann_body"): neumann_body,
-            ("iteration", "theta"): theta,
-            ("iteration", "relaxation"): relaxation,
-            ("iteration", "tolerance"): tolerance,
-            ("iteration", "max_iterations"): max_iterations,
-        }
-        for name, pair in {"young": young, "poisson": poisson, "cells": cells}.items():
-            if pair is not None and self.contact.lines:
-                raise self.refuse(name, pair, f"needed with_keys, as body3.{name}: there are more than two bodies")
-            if pair is not None and (not isinstance(pair, (list, tuple)) or len(pair) != 2):
-                needed = "needed two values, for body 1 and body 2 (None leaves a body as it is)"
-                raise self.refuse(name, pair, needed)
-            given |= {(f"body{i}", name): value for i, value in enumerate(pair or (), 1)}
-        if self.contact.lines and neumann_body in (1, 2):
-            del given["iteration", "neumann_body"]
-            given["iteration", "neumann_bodies"] = self.numbers(neumann_body)
-        return self._with({key: value for key, value in given.items() if value is not None})
+        given: dict[Key, Any] = {}
+        for name, value in values.items():
+            if value is not None:
+                given |= self._given(name, value)
+        return self._with(given)
+
+    def _given(self, name: str, value: Any) -> dict[Key, Any]:
+        """Return what a value of :meth:`changed` sets."""
+        if name == "neumann_body" and self.several and value in (1, 2):
+            return {("iteration", "neumann_bodies"): self.numbers(value)}
+        if name == "friction" and callable(value):
+            value = self._read_at_nodes(value)
+        for table, cls in TABLES.items():
+            if name in names(cls):
+                return {(*table, name): value}
+        if name not in names(BodySpec):
+            known = [name for cls in (*TABLES.values(), BodySpec) for name in names(cls)]
+            raise TypeError(f"changed() has no argument {name!r}{did_you_mean(name, known)}")
+        if self.several:
+            raise self.refuse(name, value, f"needed with_keys, as body3.{name}: there are more than two bodies")
+        if not isinstance(value, (list, tuple)) or len(value) != 2:
+            raise self.refuse(name, value, "needed two values, for body 1 and body 2 (None leaves a body as it is)")
+        return {(f"body{i}", name): one for i, one in enumerate(value, 1) if one is not None}
 
     def _read_at_nodes(self, function: Callable[[float], float]) -> dict[str, list[Any]]:
         """Return the table of a function at the contact nodes of a rectangle."""
-        if self.contact.lines:
+        if self.several:
             raise self.refuse("contact.friction", None, "needed a number or a table in each [[contact]] of the file")
         body, other = self.body1, self.body2
         if self.contact_body == 2:
@@ -239,7 +182,7 @@ class Problem(ProblemSpec):
 
     def _with(self, values: Mapping[Key, Any]) -> Problem:
         """Set some keys of the file, in order; a rule that takes its step from rho, without a theta, gets ``auto``."""
-        data = tables(self)
+        data = self.tables()
         if not takes_theta(values.get(("iteration", "relaxation"))):
             values = {("iteration", "theta"): "auto", **values}
         for key, value in values.items():
@@ -279,7 +222,8 @@ class Problem(ProblemSpec):
     def swapped(self) -> Problem:
         """Return the same problem with the Neumann problem given to the other body."""
         other: Literal[1, 2] = 1 if self.iteration.neumann_body == 2 else 2
-        return replace(self, iteration=replace(self.iteration, neumann_body=other))
+        bodies = self.numbers(other) if self.several else ()
+        return replace(self, iteration=replace(self.iteration, neumann_body=other, neumann_bodies=bodies))
 
     def refined(self, halvings: int) -> Problem:
         """Return the same problem on a mesh halved ``halvings`` times.
@@ -340,25 +284,3 @@ def _value(name: str, value: Any, source: str) -> Any:
     if value.lstrip()[0] in "\"'[{":
         raise ProblemError(source, name, value, "this is not a TOML value: a bracket, brace or quotation mark is wrong")
     return value
-
-
-def _without_defaults(problem: ProblemSpec, data: dict[str, Any]) -> dict[str, Any]:
-    """Leave out the later keys of a problem that have their default: it reads back the same without them."""
-
-    def shorter(less: dict[str, Any]) -> dict[str, Any]:
-        try:
-            return less if tables(read_problem(less, problem.source)) == tables(problem) else data
-        except ProblemError:  # the file must have them
-            return data
-
-    for name in [name for name in data if name not in (*ALWAYS, *NEVER)]:
-        data = shorter(_without(data, name))
-    for name, always in ALWAYS.items():
-        table = data[name] if always and isinstance(data[name], dict) else {}
-        for key in [key for key in table if key not in always]:
-            data = shorter(data | {name: _without(data[name], key)})
-    return data
-
-
-def _without(table: Mapping[str, Any], name: str) -> dict[str, Any]:
-    return {key: value for key, value in table.items() if key != name}

@@ -1,32 +1,37 @@
-"""Parts of a problem: two bodies, their contact, the iteration and the norm, as plain data."""
+"""The tables of a problem file: two bodies, their contacts, the iteration and the norm, each key said once."""
 
 from __future__ import annotations
 
 import hashlib
+import math
 from bisect import bisect
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, Self
 
-from ndtheory import HypothesisError, relaxation_factor
+from ndtheory.keys import Part, key, says
 from ndtheory.moduli import Moduli
-from verification.problem.tables import Unfit, unreadable
-
-V = TypeVar("V")
-
-#: A displacement or a force by component; None leaves a displacement component free.
-Components = tuple[Fraction | None, ...]
-
-#: A relaxation factor, or ``auto`` for the one that the theory chooses.
-Theta = Fraction | Literal["auto"]
+from verification.problem import readers
+from verification.problem.entries import EMPTY, REQUIRED, At, Entries, ReadOnly, Spread, entry, read_table
+from verification.problem.readers import SIDES, Components, Theta
+from verification.problem.tables import (
+    ProblemError,
+    Unfit,
+    choice,
+    ends,
+    label,
+    non_negative,
+    positive,
+    several,
+    text,
+    unreadable,
+)
+from verification.registry import LAWS, RULES
 
 #: Where the bodies of a file are.
 PLACES = {1: "lower", 2: "upper"}
-
-RECTANGLE_SIDES = ("left", "right", "bottom", "top")
-INTERVAL_SIDES = ("left", "right")
 
 #: Largest size of a mesh file: several times the size of the largest mesh as text.
 MOST_MESH_BYTES = 200_000_000
@@ -34,66 +39,22 @@ MOST_MESH_BYTES = 200_000_000
 #: Largest number of cells of a body, so that a typing error does not fill the memory.
 MOST_CELLS = 250_000
 
-#: Largest ratio of the two moduli: at 1e60 the bounds of Section 5, with high powers of M C_R / m, overflow a double.
-MOST_CONTRAST = Fraction(10**30)
-
-#: The same in one stiffness matrix, of a body with several materials or of several bodies: a hard inclusion of 1e12
-#: changes the force by 2e-4, one of 1e14 by a percent.
-MOST_WITHIN = Fraction(10**8)
-
 #: Largest number of increments of a loading history, all of whose results are kept.
 MOST_INCREMENTS = 2000
 
-#: Least coefficient of friction but 0: the theorem as printed allows 1e-44 and less for steel in Pa.  Smaller ones
-#: would lead to a kappa_1 or kappa_2 that is refused.
-LEAST_FRICTION = Fraction(1, 10**70)
+#: The order of keys that come last in a table.
+LAST = 10**6
 
-#: Largest coefficient of friction: all contact sticks already, and larger ones would only overflow.
-MOST_FRICTION = Fraction(10**9)
-
-
-class ReadOnly(Mapping[str, V]):
-    """An immutable mapping that a frozen dataclass can hold; equal ones iterate alike, in the order of the keys.
-
-    >>> ReadOnly({"top": 1, "left": 2})
-    {'left': 2, 'top': 1}
-    """
-
-    __slots__ = ("_values",)
-
-    def __init__(self, values: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
-        self._values = dict(sorted(dict(values).items()))
-
-    def __getitem__(self, key: str) -> V:
-        return self._values[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __hash__(self) -> int:
-        return hash(tuple(self._values.items()))
-
-    def __repr__(self) -> str:
-        return repr(self._values)
+#: Two numbers [a, b], a < b.
+Ends = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeshFile:
-    """A mesh file as it was when the problem was read.
+class MeshFile(Part):
+    """A mesh file as it was when the problem was read."""
 
-    Attributes
-    ----------
-    path : Path
-        Absolute, so that it means the same file wherever the process or the problem goes.
-    sha256 : str
-        Of the content, in hexadecimal digits.
-    """
-
-    path: Path
-    sha256: str
+    path: Path = key("absolute, so that it means the same file wherever the process or the problem goes")
+    sha256: str = key("of the content, in hexadecimal digits")
 
     @classmethod
     def read(cls, path: Path, sha256: str | None = None) -> MeshFile:
@@ -132,17 +93,122 @@ def _fingerprint(path: Path) -> str:
         raise Unfit(f"cannot be read: {error.strerror}") from None
 
 
+def _mesh(value: Any, at: At) -> MeshFile:
+    """Read a mesh file: its name, its name and the SHA-256 it must have, or one that was read before."""
+    if isinstance(value, MeshFile):
+        return value
+    digest = None
+    if isinstance(value, Mapping):
+        inside = at.inside(value)
+        value, digest = inside.take("path", text), inside.take("sha256", readers.sha256)
+        inside.close()
+    path = (Path() if at["source"] == "<dict>" else Path(at["source"]).parent) / text(value)
+    try:
+        return MeshFile.read(path, digest)
+    except Unfit as error:
+        raise at.table.refuse("mesh", path, str(error)) from None
+
+
+_ONE = "needed the ends of a part along x or along y, received both"
+
+
 @dataclass(frozen=True, kw_only=True)
-class SidePart:
+class SidePart(Entries):
     """A part of a side of a body: the side's edges between two positions along an axis (unit of length)."""
 
-    side: str
-    axis: Literal["x", "y"]
-    ends: tuple[Fraction, Fraction]
+    side: str = entry(
+        "the side to which a named part belongs",
+        reader=lambda value, at: (label if at["sides"] is None else choice(*at["sides"]))(value),
+    )
+    x: Ends | None = entry(
+        "its ends along x", ends, unit="length", initial=None, only=lambda at: "y" not in at.table or _ONE
+    )
+    y: Ends | None = entry("its ends along y", ends, unit="length", initial=None, only=lambda at: "y" in at.table)
+
+    @property
+    def axis(self) -> Literal["x", "y"]:
+        """The axis along which it has ends."""
+        return "y" if self.x is None else "x"
+
+    @property
+    def ends(self) -> Ends:
+        """Its ends along that axis."""
+        found = self.x or self.y
+        assert found is not None
+        return found
+
+
+def _parts(value: Any, at: At) -> dict[str, SidePart]:
+    """Read parts of sides, each with its own name."""
+    table, known, parts = at.inside(value), SIDES.get(at["shape"]), {}
+    for name in readers.names(table):
+        if at["dimension"] == 1:
+            raise table.refuse(name, None, "the side of a bar is a point: it has no parts")
+        if known is not None and name in known:
+            raise table.refuse(name, None, "needed a name that no side has; known here: " + ", ".join(known))
+        parts[name] = read_table(SidePart, table.table(name, required=True), sides=known)
+    return parts
+
+
+_elastic = lambda at: at["shape"] != "rigid"
 
 
 @dataclass(frozen=True, kw_only=True)
-class BodySpec:
+class Loads(Entries):
+    """Loads of a body, or those that a step of a loading history names: without a body force it keeps its value."""
+
+    prescribed: Mapping[str, Components] = entry(
+        'sides with a given displacement, as `{ top = [0.0, -0.015] }`; `"free"` leaves a component free',
+        None,
+        EMPTY,
+        "length",
+        reader=lambda value, at: readers.by_side(value, at, free=True),
+        only=_elastic,
+        initial=ReadOnly(),
+        type="map of vector",
+        order=LAST,
+    )
+    traction: Mapping[str, tuple[Fraction, ...]] = entry(
+        "force per area on sides, as `{ right = [0.0, -60.0] }`",
+        None,
+        EMPTY,
+        "stress",
+        reader=readers.by_side,
+        only=_elastic,
+        initial=ReadOnly(),
+        type="map of vector",
+        order=LAST,
+    )
+    body_force: tuple[Fraction, ...] = entry(
+        "force per volume, as `[0.0, -1.0]`",
+        None,
+        lambda at: at["kept"],
+        "stress/length",
+        reader=readers.vector,
+        only=_elastic,
+        initial=(),
+        type="vector",
+        order=LAST,
+    )
+
+
+_drawn = lambda at: "mesh" not in at.table
+_needed = lambda at: REQUIRED if _elastic(at) else None
+_of_surfaces = lambda body, i: {name: moduli[i] for name, moduli in body.materials.items()}
+_NO_POISSON = "a bar has no Poisson ratio; leave it out in one dimension"
+
+
+def _cells(value: Any, at: At) -> tuple[int, ...]:
+    """Read numbers of cells."""
+    pair = several(readers.at_least_one, 2, "two whole numbers >= 1, along x and y")
+    cells = pair(value) if at["dimension"] == 2 else (readers.at_least_one(value),)
+    if math.prod(cells) > MOST_CELLS:
+        raise Unfit(f"needed at most {MOST_CELLS} cells")
+    return cells
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodySpec(Loads):
     """A body as the problem file describes it; lengths and stresses in the file's units.
 
     Attributes
@@ -156,30 +222,80 @@ class BodySpec:
         E and Poisson's ratio of each named surface of a mesh file; empty where the body is of one material.
     plane : {'strain', 'stress'}
         Plane strain or plane stress, the same for both bodies.
-    parts : read-only mapping from name to SidePart
-        Parts of sides, each with a name that is used like a side's.
-    prescribed, traction : read-only mapping from side to components
-        Displacement (length; None: free) and force per area (stress).
-    body_force : tuple of Fraction
-        Force per volume.
     members : tuple of pairs of a number and BodySpec
         The bodies of a union with their numbers in the file, in their order; empty for a single body.
     """
 
-    shape: Literal["rectangle", "interval", "mesh", "rigid", "union"]
-    x: tuple[Fraction, Fraction] | None = None
-    y: tuple[Fraction, Fraction] | None = None
-    cells: tuple[int, ...] | None = None
-    mesh: MeshFile | None = None
-    young: Fraction = Fraction(0)
-    poisson: Fraction = Fraction(0)
-    parts: Mapping[str, SidePart] = field(default_factory=ReadOnly)
-    fixed: tuple[str, ...] = ()
-    prescribed: Mapping[str, Components] = field(default_factory=ReadOnly)
-    traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
-    body_force: tuple[Fraction, ...] = ()
+    part = "Body"
+
+    shape: Literal["rectangle", "interval", "mesh", "rigid", "union"] = entry(
+        '`"rectangle"`, in one dimension `"interval"`; `"rigid"` makes the body an obstacle (for `solve`)',
+        reader=lambda value, at: choice("interval" if at["dimension"] == 1 else "rectangle", "rigid")(value),
+        only=_drawn,
+        initial="mesh",
+        write=lambda body: None if body.mesh else body.shape,
+        absent="with a mesh file",
+    )
+    x: Ends | None = entry(
+        "ends `[a, b]`, a < b; an obstacle may have none", ends, _needed, "length", initial=None, only=_drawn
+    )
+    y: Ends | None = entry(
+        "the same", ends, _needed, "length", initial=None, only=lambda at: at["dimension"] == 2 and _drawn(at)
+    )
+    cells: tuple[int, ...] | None = entry(
+        "`[along x, along y]`, in one dimension one number; each rectangle is split along alternating diagonals",
+        reader=_cells,
+        initial=None,
+        only=lambda at: _elastic(at) and _drawn(at),
+        write=lambda body: body.cells if body.shape == "rectangle" else body.cells and body.cells[0],
+        type="free",
+        unit="1",
+    )
+    mesh: MeshFile | None = entry(
+        "a triangle mesh file instead of `shape`, `x`, `y` and `cells`; its sides are its named lines."
+        ' `{ path = "..", sha256 = ".." }` refuses a file with another content',
+        reader=_mesh,
+        only=lambda at: "mesh" in at.table,
+        initial=None,
+        counts=lambda mesh: mesh and mesh.sha256,
+    )
+    young: Fraction = entry(
+        "$E > 0$; with a mesh file also a table by its named surfaces",
+        reader=lambda value, at: readers.by_surface(value, at, positive),
+        initial=Fraction(0),
+        only=_elastic,
+        write=lambda body: _of_surfaces(body, 0) or body.young or None,
+        type="free",
+        unit="stress",
+        absent="of an obstacle",
+    )
+    poisson: Fraction = entry(
+        r"$-1 < \nu < 1/2$, in plane stress $-1/2 < \nu \le 1/2$; or a table like that of `young`",
+        reader=lambda value, at: readers.by_surface(value, at, readers.poisson(at)),
+        initial=Fraction(0),
+        only=lambda at: _elastic(at) and (at["dimension"] == 2 or _NO_POISSON),
+        write=lambda body: _of_surfaces(body, 1) or (body.poisson if body.shape in ("rectangle", "mesh") else None),
+        type="free",
+        unit="1",
+        absent="of an obstacle and in one dimension",
+    )
+    parts: Mapping[str, SidePart] = entry(
+        'named parts of sides, as `{ pressed = { side = "top", x = [0.0, 0.8] } }`: the edges of that side between two'
+        " positions along x or y; `fixed`, `prescribed`, `traction` take the name",
+        reader=_parts,
+        default=EMPTY,
+        initial=ReadOnly(),
+        only=_elastic,
+    )
+    fixed: tuple[str, ...] = entry(
+        'sides with $u = 0$, as `["bottom"]`',
+        reader=readers.side_list,
+        default=(),
+        only=_elastic,
+        counts=lambda sides: tuple(sorted(sides)),
+    )
     plane: Literal["strain", "stress"] = "strain"
-    materials: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=ReadOnly)
+    materials: Mapping[str, tuple[Fraction, Fraction]] = ReadOnly()
     members: tuple[tuple[int, BodySpec], ...] = ()
 
     @classmethod
@@ -197,10 +313,6 @@ class BodySpec:
         plane = each[0][1].plane
         moduli = {"young": young, "poisson": poisson, "materials": materials}
         return cls(shape="union", plane=plane, members=each, **moduli)
-
-    def __post_init__(self) -> None:
-        for name in ("parts", "prescribed", "traction", "materials"):
-            object.__setattr__(self, name, ReadOnly(getattr(self, name)))
 
     @property
     def rigid(self) -> bool:
@@ -264,156 +376,148 @@ class Profile:
         return {"s": self.s, "k": tuple(k * share for share in self.share)}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Loads:
-    """Loads of a body that a step of a loading history names: prescribed displacements, tractions, body force.
-
-    Attributes as those of :class:`BodySpec`; the body force is None where it keeps its value.
-    """
-
-    prescribed: Mapping[str, Components] = field(default_factory=ReadOnly)
-    traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
-    body_force: tuple[Fraction, ...] | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("prescribed", "traction"):
-            object.__setattr__(self, name, ReadOnly(getattr(self, name)))
+def _friction(value: Any, at: At) -> tuple[Fraction, Profile | None]:
+    """Read a coefficient, or a table of it along Gamma_c: the largest one, and how it varies."""
+    if not isinstance(value, Mapping) or not value:
+        return readers.coefficient(value), None
+    inside = at.inside(value)
+    s, k = inside.take("s", readers.positions), inside.take("k", readers.listed(readers.coefficient))
+    inside.close()
+    if len(s) != len(k):
+        raise inside.refuse("k", list(k), f"needed as many values as s has, {len(s)}")
+    return Profile.of(s, k)
 
 
-@dataclass(frozen=True, kw_only=True)
-class StepSpec:
-    """A step of a loading history: the loads at its end, reached in equal increments from those before."""
-
-    name: str
-    increments: int
-    body1: Loads
-    body2: Loads
+_SIDES = 'two names of sides, of body 1 and of body 2, as ["deck", "tip"]'
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
-    """A table ``[[contact]]``: the line along which two bodies of a file meet.
+class ContactSpec(Entries):
+    """A contact of two bodies: where they meet, the law of friction there, and the initial distance.
 
     Attributes
     ----------
     bodies : pair of int
-        Their numbers in the file, in the order of its ``surface``.
-    contact : ContactSpec
-        The rest of the table.
-    share : Fraction
-        Its friction over the largest one of all lines; 1 where there is none.
-    """
-
-    bodies: tuple[int, int]
-    contact: ContactSpec
-    share: Fraction = Fraction(1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ContactSpec:
-    """Gamma_c, the friction law and the initial distance.
-
-    Attributes
-    ----------
-    interval : pair of Fraction or None
-        Ends of Gamma_c along x; None: the overlap of the two surfaces.
-    surface : pair of str or None
-        Names of the sides of body 1 and of body 2 that meet, instead of an interval: a line of any shape.
+        Their numbers in the file, in the order of ``surface``.
     friction : Fraction
-        k, the largest one where it varies along Gamma_c.
-    law : str
-        One of :data:`verification.registry.LAWS`.
-    radius : Fraction or None
-        Radius r of the hat kernel (length); None with a law that has none or without friction.
-    gap : Fraction
-        Initial distance (length).
+        k, the largest one where it varies along the line.
     profile : Profile or None
         How k varies; None where it is constant.
-    lines : tuple of Line
-        The contacts of more than two bodies, which together are Gamma_c; empty for two bodies.
     """
 
-    interval: tuple[Fraction, Fraction] | None
-    friction: Fraction
-    law: str
-    radius: Fraction | None
-    gap: Fraction
+    part = "Contact table"
+
+    bodies: tuple[int, int] = entry(
+        "in tables `[[contact]]`: the numbers of two bodies",
+        reader=readers.two_bodies,
+        only=lambda at: at["several"],
+        initial=(1, 2),
+        absent="in a single table `[contact]`: they are 1 and 2",
+    )
+    interval: Ends | None = entry(
+        r"$\Gamma_c$, part of the x axis between nodes (an end within a thousandth of an edge from a node is moved"
+        " there); without it the overlap of the flat top and the flat bottom",
+        ends,
+        None,
+        "length",
+    )
+    friction: Fraction = entry(
+        r"the coefficient $0 \le k \le 10^9$, exactly; where it varies a table of `s` (length) and `k`",
+        reader=_friction,
+        default=(Fraction(0), None),
+        initial=Fraction(0),
+        shown="0",
+        write=lambda contact: (
+            contact.profile.table(contact.friction) if contact.profile and contact.friction else contact.friction
+        ),
+        type="free",
+        unit="1",
+    )
+    law: str = entry(
+        '`"nonlocal"`, or `"local"` (outside the theorem); `"local-contact"` is the local law with the pressure of the'
+        " contact grid, Coulomb's law at each node; where the grids differ, only `solve` accepts it",
+        lambda value: choice(*LAWS)(value),  # those that are registered at that moment
+        "nonlocal",
+    )
+    radius: Fraction | None = entry(
+        "radius $r$ of the hat kernel; needed by the non-local law with friction", positive, None, "length"
+    )
+    gap: Fraction = entry(
+        r"$\ge 0$, added to the distance of the surfaces as they are drawn", non_negative, Fraction(0), "length"
+    )
+    surface: tuple[str, str] | None = entry(
+        "instead of `interval`: the sides of the bodies that meet, lines of any shape", several(label, 2, _SIDES), None
+    )
     profile: Profile | None = None
-    surface: tuple[str, str] | None = None
-    lines: tuple[Line, ...] = ()
-
-    @classmethod
-    def of_lines(cls, lines: Iterable[tuple[tuple[int, int], ContactSpec]], law: str) -> ContactSpec:
-        """Return the contacts of several bodies as one, whose friction is the largest one."""
-        pairs = tuple(lines)
-        k = max(contact.friction for _, contact in pairs)
-        radii = {contact.radius for _, contact in pairs}
-        each = (
-            Line(bodies=bodies, contact=contact, share=contact.friction / k if k else Fraction(1))
-            for bodies, contact in pairs
-        )
-        radius = radii.pop() if len(radii) == 1 else None
-        return cls(interval=None, friction=k, law=law, radius=radius, gap=Fraction(0), lines=tuple(each))
-
-    def rubbing(self, k: Fraction) -> ContactSpec:
-        """Return the same contact with k as its largest coefficient of friction, of which lines keep their shares."""
-        lines = (replace(line, contact=line.contact.rubbing(k * line.share)) for line in self.lines)
-        return replace(self, friction=k, lines=tuple(lines))
-
-    @property
-    def varies(self) -> bool:
-        """True if the coefficient of friction may differ from place to place: k is then the largest one."""
-        return self.profile is not None or bool(self.lines)
-
-    @property
-    def named(self) -> bool:
-        """True if Gamma_c is one or more named lines."""
-        return self.surface is not None or bool(self.lines)
 
     @property
     def frictions(self) -> tuple[float, ...]:
         """k, or the least and the largest one where it varies."""
-        if self.lines:
-            each = {k for line in self.lines for k in line.contact.frictions}
-            return (min(each), max(each)) if len(each) > 1 else (*each,)
         shares = () if self.profile is None else (min(self.profile.share),)
         return tuple(float(self.friction * share) for share in (*shares, 1))
 
-    @property
-    def friction_words(self) -> str:
-        """The same as a text: ``0.3``, or ``0.1 to 0.3``."""
-        return " to ".join(f"{k:g}" for k in self.frictions)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
-    """Settings of a run: its relaxation and when it ends.
+class Settings(Entries):
+    """Settings of a run: its relaxation and when it ends; see the problem file."""
 
-    Attributes
-    ----------
-    theta : Fraction or 'auto'
-        ``auto``: the proved theta; the predicted one where nothing is proved or the proved one is more than twice as
-        slow.  Momentum takes its step from rho: ``auto`` unless the file has a theta, which is then not used.
-    relaxation : str
-        One of :data:`verification.registry.RULES`; the theorem covers only ``constant``.
-    tolerance : float
-        The run ends when ``|||T g - g||| <= tolerance |||T g|||`` in the norm (5.21), with the largest T g so far.
-    """
-
-    theta: Theta = Fraction(1, 2)
-    relaxation: str = "constant"
-    tolerance: float = 1e-9
-    max_iterations: int = 500
+    theta: Theta = entry(
+        r'relaxation factor, $0 < \theta < 1$; or `"auto"`: the proved theta, unless none is proved or it is predicted'
+        " to need more than twice the steps of the predicted one. Not used by momentum",
+        readers.factor,
+        lambda at: Fraction(1, 2) if readers.takes_theta(at.table.get("relaxation")) else "auto",
+        "1",
+        initial=Fraction(1, 2),
+        shown="1/2",
+    )
+    relaxation: str = entry(
+        '`"constant"`, or outside the theorem `"aitken"`, `"anderson"`, `"iqn-ils"`, `"newton"`, `"momentum"` (proved'
+        r" at $k = 0$; takes its step from $\rho$)",
+        lambda value: choice(*RULES)(value),
+        "constant",
+    )
+    tolerance: float = entry(
+        r"the run ends when $\lvert\lvert\lvert Tg - g\rvert\rvert\rvert$ is at most this part of the larger of"
+        r" $\lvert\lvert\lvert g\rvert\rvert\rvert$ and $\lvert\lvert\lvert Tg\rvert\rvert\rvert$, in a state"
+        " of contact",
+        lambda value: float(readers.tolerance(value)),
+        1e-9,
+        "1",
+        type="exact",
+    )
+    max_iterations: int = entry(
+        "the run ends after so many steps. Every iterate is kept, so there is a largest number: they may fill 2 GB,"
+        " which is 624,000 steps at 25 contact nodes",
+        readers.at_least_one,
+        500,
+        "1",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class IterationSpec(Settings):
-    """The table ``[iteration]``: settings of a run, and the body of the linear problem of step I.
+    """The table ``[iteration]``: settings of a run, and who gets the linear problem of step I."""
 
-    ``neumann_body`` is 2 in Section 3, 1 in Section 6.
-    """
-
-    neumann_body: Literal[1, 2] = 2
+    neumann_body: Literal[1, 2] = entry(
+        "the {term}`Neumann body`, which gets the linear problem of step I: 2 as in Section 3, 1 as in Section 6",
+        choice(1, 2),
+        2,
+        only=lambda at: not at["several"] or "needed neumann_bodies, a list of numbers, with tables [[contact]]",
+        write=lambda iteration: None if iteration.neumann_bodies else iteration.neumann_body,
+        type="integer",
+        absent="with tables `[[contact]]`",
+        order=-2,
+    )
+    neumann_bodies: tuple[int, ...] = entry(
+        "with tables `[[contact]]`, instead of `neumann_body`: the numbers of all bodies with the linear problem of"
+        " step I, as `[1, 3]`",
+        reader=readers.roles,
+        default=lambda at: at["chosen"],
+        initial=(),
+        only=lambda at: at["several"],
+        shown="a colour whose bodies have supports, without body 1 if there is a choice",
+        order=-1,
+    )
 
     @property
     def settings(self) -> Settings:
@@ -421,20 +525,108 @@ class IterationSpec(Settings):
         return Settings(**{field.name: getattr(self, field.name) for field in fields(Settings)})
 
 
+def _increments(value: Any, at: At) -> int:
+    """Read the number of increments of a step."""
+    if readers.at_least_one(value) + at["before"] > MOST_INCREMENTS:
+        raise Unfit(f"needed at most {MOST_INCREMENTS} increments of all steps")
+    return int(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepSpec(Entries):
+    """A step of a loading history: the loads at its end, reached in equal increments from those before."""
+
+    part = "Step"
+
+    name: str = entry("a text", label, lambda at: f"step {at['number']}", shown='`"step 1"`, ..')
+    increments: int = entry(
+        f"number of equal increments, at most {MOST_INCREMENTS} in all steps", None, 1, "1", reader=_increments
+    )
+    body1: Loads = entry("loads at the end of the step", shown="as before", absent="where there is none")
+    body2: Loads = entry("loads at the end of the step", shown="as before", absent="where there is none")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Units(Entries):
+    """The table ``[units]``."""
+
+    length: str = entry("labels", label, "mm")
+    stress: str = entry("labels", label, "MPa")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Norm(Entries):
+    """The table ``[norm]``."""
+
+    length: Fraction = entry(
+        r"$L$ in the norm $\lvert v\rvert^2/L^2 + \lvert\nabla v\rvert^2$", positive, Fraction(1), "length"
+    )
+
+
+_nothing = lambda value: None
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
-class ProblemSpec:
+class ProblemSpec(Entries):
     """The tables of a problem file, each key with its value; see :class:`verification.Problem`."""
 
-    title: str
-    dimension: Literal[1, 2]
-    units: Mapping[str, str]
-    body1: BodySpec
-    body2: BodySpec
-    contact: ContactSpec
-    iteration: IterationSpec
-    length: Fraction
-    steps: tuple[StepSpec, ...] = ()
+    part = "Problem"
+
+    title: str = entry("a text for screens and figures, without control characters", label, "untitled", counts=_nothing)
+    dimension: Literal[1, 2] = entry("1 (two bars) or 2 (bodies in the plane)", choice(1, 2), 2, type="integer")
+    plane: Literal["strain", "stress"] = entry(
+        '`"strain"` for thick bodies, `"stress"` for thin plates; all bodies, in the plane only',
+        readers.plane,
+        "strain",
+        only=lambda at: at["dimension"] == 2 or "a bar has none; leave it out in one dimension",
+        write=lambda problem: problem.plane if problem.dimension == 2 else None,
+        later=True,
+        absent="in one dimension",
+    )
+    units: Mapping[str, str] = entry(
+        default=EMPTY,
+        reader=lambda value, at: vars(read_table(Units, at.inside(value))),
+        counts=_nothing,
+        type="object",
+        table=Units,
+    )
+    body1: BodySpec = entry("below", write=lambda problem: problem.bodies[1])
+    body2: BodySpec = entry(
+        "above", write=lambda problem: Spread((f"body{i}", body) for i, body in problem.bodies.items() if i > 1)
+    )
+    contacts: tuple[ContactSpec, ...] = entry(
+        "the table `[contact]`, or a list of the tables `[[contact]]` where the file has them",
+        name="contact",
+        write=lambda problem: problem.contacts if problem.several else replace(problem.contacts[0], bodies=()),
+        type="Contact table, or list of Contact table",
+        table=ContactSpec,
+    )
+    iteration: IterationSpec = entry()
+    norm: Norm = entry(reader=lambda value, at: read_table(Norm, at.inside(value)), default=EMPTY, initial=Norm())
+    steps: tuple[StepSpec, ...] = entry("of a loading history", name="step", initial=())
     source: str = field(default="<dict>", compare=False)
+
+    @property
+    @says("and so on", absent="of two bodies")
+    def body3(self) -> BodySpec | None:
+        """Body 3 of the file."""
+        return self.bodies.get(3)
+
+    @property
+    def length(self) -> Fraction:
+        """L of the norm ``|v|^2/L^2 + |grad v|^2``."""
+        return self.norm.length
+
+    def refuse(self, key: str, value: object, needed: str) -> ProblemError:
+        """Return the error for a key of this problem."""
+        return ProblemError(self.source, key, value, needed)
+
+    # --- bodies: those of the file, and the two of the iteration ---
+
+    @property
+    def several(self) -> bool:
+        """True if the file has tables ``[[contact]]``: body 1 and body 2 are then unions of its bodies."""
+        return bool(self.body1.members)
 
     @property
     def bodies(self) -> dict[int, BodySpec]:
@@ -451,25 +643,49 @@ class ProblemSpec:
         numbers = self.numbers(body)
         return f"{'body' if len(numbers) == 1 else 'bodies'} {', '.join(map(str, numbers))}"
 
+    # --- contacts: one by one, and what is said of all together ---
+
     @property
-    def plane(self) -> Literal["strain", "stress"]:
-        """Plane strain or plane stress; without a meaning in one dimension."""
-        return self.body2.plane if self.body1.rigid else self.body1.plane
+    def contact(self) -> ContactSpec:
+        """The contact; where there are several, what the theorem takes of all: the largest k, a law with a radius."""
+        if not self.several:
+            return self.contacts[0]
+        laws = [one.law for one in self.contacts if one.friction] or [self.contacts[0].law]
+        radii = {one.radius for one in self.contacts}
+        return ContactSpec(
+            friction=max(one.friction for one in self.contacts),
+            law=min(laws, key=lambda name: LAWS[name].needs_radius),
+            radius=radii.pop() if len(radii) == 1 else None,
+        )
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "units", ReadOnly(self.units))
+    @property
+    def shares(self) -> tuple[Fraction, ...]:
+        """The friction of each contact over the largest one; 1 where there is none."""
+        k = self.contact.friction
+        return tuple(one.friction / k if k else Fraction(1) for one in self.contacts)
 
+    @property
+    def varies(self) -> bool:
+        """True if the coefficient of friction may differ from place to place: k is then the largest one."""
+        return self.several or self.contact.profile is not None
 
-def read_theta(value: Any) -> Theta:
-    """Read a relaxation factor, or "auto".
+    @property
+    def named(self) -> bool:
+        """True if Gamma_c is one or more named lines."""
+        return self.contacts[0].surface is not None
 
-    Raises
-    ------
-    HypothesisError
-    """
-    if value == "auto":
-        return "auto"
-    try:
-        return relaxation_factor(value)
-    except HypothesisError as error:
-        raise HypothesisError(error.key, error.value, f'{error.needed}, or "auto"') from None
+    @property
+    def frictions(self) -> tuple[float, ...]:
+        """k, or the least and the largest one where it varies."""
+        each = {k for contact in self.contacts for k in contact.frictions}
+        return (min(each), max(each)) if len(each) > 1 else (*each,)
+
+    @property
+    def friction_words(self) -> str:
+        """The same as a text: ``0.3``, or ``0.1 to 0.3``."""
+        return " to ".join(f"{k:g}" for k in self.frictions)
+
+    def rubbing(self, k: Fraction) -> Self:
+        """Return the same problem with k as its largest friction, of which contacts keep their shares."""
+        each = zip(self.contacts, self.shares, strict=True)
+        return replace(self, contacts=tuple(replace(one, friction=k * share) for one, share in each))

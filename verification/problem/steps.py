@@ -10,7 +10,7 @@ from itertools import accumulate, pairwise
 from typing import Any
 
 from verification.problem.specification import Problem
-from verification.problem.specs import BodySpec, Loads
+from verification.problem.specs import Loads
 
 #: The loads of both bodies.
 Both = tuple[Loads, Loads]
@@ -56,9 +56,9 @@ def moments(problem: Problem) -> Iterator[Moment]:
 def _path(problem: Problem) -> list[Both]:
     """Return the loads where the history begins, 0 on every side that the bodies or the steps name, and at each end."""
     rest = []
-    for body, name in ((problem.body1, "body1"), (problem.body2, "body2")):
-        drawn = Loads(prescribed=body.prescribed, traction=body.traction, body_force=body.body_force)
-        rest.append(_of_each(lambda _: Fraction(0), reduce(_after, (getattr(s, name) for s in problem.steps), drawn)))
+    for name in ("body1", "body2"):
+        named: list[Loads] = [getattr(each, name) for each in (problem, *problem.steps)]
+        rest.append(_of_each(lambda _: Fraction(0), reduce(_after, named)))
     later = lambda loads, step: (_after(loads[0], step.body1), _after(loads[1], step.body2))
     return list(accumulate(problem.steps, later, initial=(rest[0], rest[1])))
 
@@ -92,14 +92,14 @@ def _numbers(loads: Both) -> list[Fraction]:
     vectors = [
         vector for each in loads for vector in (*each.prescribed.values(), *each.traction.values(), each.body_force)
     ]
-    return [v for vector in vectors for v in vector or () if v is not None]
+    return [v for vector in vectors for v in vector if v is not None]
 
 
 def _after(before: Loads, step: Loads) -> Loads:
     return Loads(
         prescribed={**before.prescribed, **step.prescribed},
         traction={**before.traction, **step.traction},
-        body_force=before.body_force if step.body_force is None else step.body_force,
+        body_force=step.body_force or before.body_force,
     )
 
 
@@ -118,10 +118,6 @@ def _of_each(of: Callable[..., Fraction], *loads: Loads) -> Loads:
 
 def _under(problem: Problem, loads: Both) -> Problem:
     """Return the problem under given loads, without steps."""
-
-    def loaded(body: BodySpec, under: Loads) -> BodySpec:
-        assert under.body_force is not None
-        return replace(body, prescribed=under.prescribed, traction=under.traction, body_force=under.body_force)
-
-    body1, body2 = (loaded(*each) for each in zip((problem.body1, problem.body2), loads, strict=True))
+    bodies = zip((problem.body1, problem.body2), loads, strict=True)
+    body1, body2 = (replace(body, **vars(under)) for body, under in bodies)
     return replace(problem, body1=body1, body2=body2, steps=())

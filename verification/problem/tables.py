@@ -241,6 +241,10 @@ class TomlTable:
     def __contains__(self, name: str) -> bool:
         return name in self._data
 
+    def get(self, name: str) -> Any:
+        """Return the value of a key as it is, None where there is none; the key is still to be taken."""
+        return self._data.get(name)
+
     def take(self, name: str, read: Callable[[Any], V], default: Any = _MISSING) -> V:
         """Read a key; a missing one takes its default or raises ProblemError, as a value does that does not fit."""
         self._known.append(name)

@@ -1,4 +1,4 @@
-"""A problem as the dictionary of its file, exactly, and a dictionary as TOML text."""
+"""The values of a problem as JSON has them, exactly, and a dictionary as TOML text."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
-from ndtheory import exact
+from ndtheory import exact, keys
 from ndtheory.number import LARGEST_EXPONENT
 from ndtheory.texts import CONTROL
-from verification.problem.specs import BodySpec, ContactSpec, Loads, MeshFile, ProblemSpec, StepSpec
 
 #: Integers up to this size are doubles: readers of JSON agree on them.
 LARGEST_INTEGER = 2**53
@@ -21,97 +20,14 @@ ESCAPED = re.compile(rf'(?![\ud800-\udfff])(?:{CONTROL.pattern}|["\\])')  # TOML
 SHORT = {"\b": r"\b", "\t": r"\t", "\n": r"\n", "\f": r"\f", "\r": r"\r", '"': r"\"", "\\": r"\\"}
 
 
-def tables(problem: ProblemSpec) -> dict[str, Any]:
-    """Return the keys of the problem file with the values that their readers return.
-
-    They come in the order of the built-in files.  A key without a value (no interval, no radius, no sides) is left out.
-    """
-    return {
-        "title": problem.title,
-        "dimension": problem.dimension,
-        **({"plane": problem.plane} if problem.dimension == 2 else {}),
-        "units": dict(problem.units),
-        **{f"body{i}": _body(body) for i, body in problem.bodies.items()},
-        "contact": _contacts(problem.contact),
-        "iteration": _iteration(problem),
-        "norm": {"length": problem.length},
-        **({"step": tuple(_step(step, problem.dimension == 1) for step in problem.steps)} if problem.steps else {}),
-    }
-
-
-def _body(body: BodySpec) -> dict[str, Any]:
-    bar = body.shape == "interval"
-    written: dict[str, Any] = {
-        "shape": None if body.mesh else body.shape,
-        "mesh": body.mesh,
-        "x": body.x,
-        "y": body.y,
-        "cells": body.cells[0] if bar and body.cells else body.cells,
-    }
-    if not body.rigid:
-        written |= {
-            "young": {name: E for name, (E, _) in body.materials.items()} or body.young,
-            "poisson": {name: nu for name, (_, nu) in body.materials.items()} or (None if bar else body.poisson),
-            "parts": {name: {"side": part.side, part.axis: part.ends} for name, part in body.parts.items()},
-            "fixed": body.fixed,
-            **_loads(body, bar),
-        }
-    return _present(written)
-
-
-def _loads(loads: BodySpec | Loads, bar: bool) -> dict[str, Any]:
-    force = loads.body_force
-    return {
-        "prescribed": {side: _vector(values, bar) for side, values in loads.prescribed.items()},
-        "traction": {side: _vector(values, bar) for side, values in loads.traction.items()},
-        "body_force": None if force is None else _vector(force, bar),
-    }
-
-
-def _step(step: StepSpec, bar: bool) -> dict[str, Any]:
-    bodies = {name: _present(_loads(loads, bar)) for name, loads in (("body1", step.body1), ("body2", step.body2))}
-    return _present({"name": step.name, "increments": step.increments, **bodies})
-
-
-def _contacts(contact: ContactSpec) -> Any:
-    if not contact.lines:
-        return _contact(contact)
-    return tuple({"bodies": line.bodies, **_contact(line.contact)} for line in contact.lines)
-
-
-def _iteration(problem: ProblemSpec) -> dict[str, Any]:
-    body, given = problem.iteration.neumann_body, vars(problem.iteration)
-    if not problem.contact.lines:
-        return {"neumann_body": body} | given
-    rest = {key: value for key, value in given.items() if key != "neumann_body"}
-    return {"neumann_bodies": problem.numbers(body)} | rest
-
-
-def _contact(contact: ContactSpec) -> dict[str, Any]:
-    written = vars(contact) | {"profile": None, "lines": None}
-    if contact.profile is not None and contact.friction:
-        written["friction"] = contact.profile.table(contact.friction)
-    return _present(written)
-
-
-def _vector(values: tuple[Fraction | None, ...], bar: bool) -> Any:
-    """List the components of a vector, None as ``free``; of a bar there is only one, and it stays a number."""
-    named = tuple("free" if v is None else v for v in values)
-    return named[0] if bar else named
-
-
-def _present(table: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in table.items() if value not in (None, (), {})}
-
-
 def plain(value: Any) -> Any:
     """Convert to the types that JSON and TOML have: dictionaries, lists, numbers, texts."""
     if isinstance(value, Mapping):
         return {key: plain(v) for key, v in value.items()}
     if isinstance(value, tuple):
         return [plain(v) for v in value]
-    if isinstance(value, MeshFile):
-        return {"path": str(value.path), "sha256": value.sha256}
+    if isinstance(value, keys.Part):
+        return value.to_dict()
     return written_number(value) if isinstance(value, Fraction) else value
 
 

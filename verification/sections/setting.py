@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from verification.problem.specification import Problem
-from verification.problem.specs import PLACES, ContactSpec
+from verification.problem.specs import PLACES
 from verification.registry import LAWS
 from verification.show.numbers import figures
 from verification.show.parts import Facts, Next, Section, closing, outside_the_theorem, section
@@ -18,11 +18,11 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     bodies = problem.bodies.values()
     moduli = " / ".join("rigid" if one.rigid else " to ".join(f"{float(E):g}" for E in one.youngs) for one in bodies)
     body = problem.iteration.neumann_body
-    friction = "no friction" if not contact.friction else f"k = {frictions(contact)}, {_laws(contact, units['length'])}"
+    friction = "no friction" if not contact.friction else f"k = {frictions(problem)}, {_laws(problem)}"
     if any(one.rigid for one in bodies):
         facts = [f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body", friction]
     else:
-        place = "" if contact.named else f" ({PLACES[body]})"  # either body may lie above along a named line
+        place = "" if problem.named else f" ({PLACES[body]})"  # either body may lie above along a named line
         numbers = problem.numbers(body)
         who = f"Neumann {'body' if len(numbers) == 1 else 'bodies'}: {', '.join(map(str, numbers))}"
         facts = [f"{who}{place}", friction, _how(problem)]
@@ -31,10 +31,10 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     return section("setting", "", first, Facts("", tuple(facts)))
 
 
-def _laws(contact: ContactSpec, length: str) -> str:
+def _laws(problem: Problem) -> str:
     """The law of friction, or those of several lines."""
-    said = []
-    for line in (one.contact for one in contact.lines) if contact.lines else (contact,):
+    said, length = [], problem.units["length"]
+    for line in problem.contacts:
         law = LAWS[line.law]
         radius = f", r = {float(line.radius):g} {length}" if line.radius is not None and law.needs_radius else ""
         if line.friction:
@@ -42,9 +42,9 @@ def _laws(contact: ContactSpec, length: str) -> str:
     return " and ".join(dict.fromkeys(said))
 
 
-def frictions(contact: ContactSpec) -> str:
+def frictions(problem: Problem) -> str:
     """k, or the least and the largest one where it varies."""
-    return " to ".join(f"{figures(k, 2)}" for k in contact.frictions)
+    return " to ".join(f"{figures(k, 2)}" for k in problem.frictions)
 
 
 def _how(problem: Problem) -> str:

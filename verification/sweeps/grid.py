@@ -15,7 +15,7 @@ from ndtheory.texts import did_you_mean
 from verification.algorithm.relaxation import Rule
 from verification.problem.examples import example, examples
 from verification.problem.files import load, read_file
-from verification.problem.reading import coefficient, factor
+from verification.problem.readers import coefficient, factor
 from verification.problem.specification import Problem
 from verification.problem.tables import (
     ProblemError,

@@ -18,7 +18,7 @@ from verification.interface.friction import GivenOperator
 from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
-from verification.problem.specs import BodySpec
+from verification.problem.specs import BodySpec, Norm
 
 
 def _of_matrices(
@@ -132,8 +132,8 @@ def problem_in_units(problem: Problem, *, stress: Fraction = Fraction(1), length
         problem,
         body1=body(problem.body1),
         body2=body(problem.body2),
-        contact=replace(contact, interval=interval, radius=radius, gap=contact.gap * length, profile=profile),
-        length=problem.length * length,
+        contacts=(replace(contact, interval=interval, radius=radius, gap=contact.gap * length, profile=profile),),
+        norm=Norm(length=problem.length * length),
     )
 
 
@@ -173,5 +173,5 @@ def problem_mirrored(problem: Problem) -> Problem:
         problem,
         body1=body(problem.body1),
         body2=body(problem.body2),
-        contact=replace(problem.contact, interval=ends, profile=profile),
+        contacts=(replace(problem.contact, interval=ends, profile=profile),),
     )

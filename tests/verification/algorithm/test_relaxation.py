@@ -295,7 +295,7 @@ def in_units(problem: vf.Problem, stress: Fraction, length: Fraction) -> vf.Prob
 
     contact = problem.contact
     contact = replace(contact, radius=length * contact.radius, gap=length * contact.gap)
-    return replace(problem, body1=body(problem.body1), body2=body(problem.body2), contact=contact)
+    return replace(problem, body1=body(problem.body1), body2=body(problem.body2), contacts=(contact,))
 
 
 @cache

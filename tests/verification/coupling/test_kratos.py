@@ -42,7 +42,7 @@ needs_kratos = pytest.mark.skipif(
 PLATES = vf.example("section6").changed(cells=((20, 3), (12, 3)))
 
 #: Half of the top is pressed, without friction: some contact nodes open.
-HALF = SidePart(side="top", axis="x", ends=(Fraction(2, 5), Fraction(1)))
+HALF = SidePart(side="top", x=(Fraction(2, 5), Fraction(1)))
 PRESSED = replace(
     PLATES.changed(friction=0),
     body2=replace(PLATES.body2, parts={"half": HALF}, prescribed={"half": PLATES.body2.prescribed["top"]}),

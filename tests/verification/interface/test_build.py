@@ -44,7 +44,7 @@ def small(**changes: object) -> vf.Problem:
     bodies = {name: replace(getattr(problem, name), cells=cells[name]) for name in cells}
     contact = replace(problem.contact, **{k: v for k, v in changes.items() if k in ("friction", "gap")})
     iteration = replace(problem.iteration, **{k: v for k, v in changes.items() if k in ("neumann_body", "theta")})
-    return replace(problem, contact=contact, iteration=iteration, **bodies)
+    return replace(problem, contacts=(contact,), iteration=iteration, **bodies)
 
 
 @pytest.mark.parametrize("neumann_body", [1, 2])

@@ -221,7 +221,7 @@ def test_friction_of_each_line_bounds_that_line():
     assert bound[:9] == pytest.approx(4 * bound[9:], rel=1e-12)
     less = pair.at(friction="0.2")
     assert less.bound(np.ones(pair.neumann.grid.size)) == pytest.approx(bound / 2, rel=1e-14)
-    assert [str(line.contact.friction) for line in less.problem.contact.lines] == ["1/5", "1/20"]
+    assert [str(contact.friction) for contact in less.problem.contacts] == ["1/5", "1/20"]
     assert np.array_equal(vf.build(less.problem).interface.kernel, pair.interface.kernel)
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 import pytest
 from stored import read
 
 import verification as vf
 from verification.certificate import claims, contraction
-from verification.problem import reading, specification
-from verification.problem.specification import Problem
+from verification.problem import reading
+from verification.problem.entries import entry
 from verification.problem.specs import ContactSpec, Settings
 from verification.problem.tables import non_negative
 from verification.sweeps import store
@@ -28,41 +27,19 @@ SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", ma
 class LaterContact(ContactSpec):
     """The contact of a later release, with adhesion."""
 
-    adhesion: Fraction = Fraction(0)
+    adhesion: Fraction = entry(read=non_negative, default=Fraction(0), later=True)
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class LaterProblem(Problem):
-    """A problem of a later release, with a table of phases."""
+@dataclass(frozen=True, kw_only=True)
+class CountingContact(ContactSpec):
+    """The same, where the key counts whatever its value."""
 
-    phases: Any = ()
+    adhesion: Fraction = entry(read=non_negative, default=Fraction(0))
 
 
-def later_contact(monkeypatch):
+def later_contact(monkeypatch, kind=LaterContact):
     """Put `contact.adhesion` into the problem file, 0 by default."""
-    read = reading.read_problem
-
-    def read_later(data, *given):
-        contact = dict(data.get("contact", {}))
-        adhesion = non_negative(contact.pop("adhesion", 0))
-        found = read({**data, "contact": contact}, *given)
-        return replace(found, contact=LaterContact(**vars(found.contact), adhesion=adhesion))
-
-    for module in (reading, specification):
-        monkeypatch.setattr(module, "read_problem", read_later)
-
-
-def later_table(monkeypatch):
-    """Put a table `phase` into what a digest reads and writes, empty by default."""
-    read, tables = specification.read_problem, specification.tables
-
-    def read_later(data, *given):
-        found = read({key: value for key, value in data.items() if key != "phase"}, *given)
-        values = {field.name: getattr(found, field.name) for field in fields(found)}
-        return LaterProblem(**values, phases=data.get("phase", ()))
-
-    monkeypatch.setattr(specification, "read_problem", read_later)
-    monkeypatch.setattr(specification, "tables", lambda it: tables(it) | {"phase": getattr(it, "phases", ())})
+    monkeypatch.setattr(reading, "ContactSpec", kind)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -82,31 +59,24 @@ def test_another_value_of_a_later_key_changes_the_digest(monkeypatch):
     assert problem.digest in found
 
 
-def test_a_later_table_changes_the_digest_where_it_says_something(monkeypatch):
-    before = vf.example("two-bars")
-    digest_before = before.digest
-    later_table(monkeypatch)
-    later = LaterProblem(**{field.name: getattr(before, field.name) for field in fields(before)})
-    assert later.digest == digest_before
-    assert replace(later, phases=("press",)).digest != digest_before
-
-
-def test_a_key_that_the_file_must_have_counts(monkeypatch):
-    before = vf.example("two-bars").digest
+def test_a_later_key_is_read_written_and_set_like_the_others(monkeypatch):
     later_contact(monkeypatch)
-    problem = vf.Problem.from_dict(vf.example("two-bars").to_dict())
-    read = specification.read_problem
-
-    def demanding(data, *given):
-        if "adhesion" not in data["contact"]:
-            raise vf.ProblemError(given[0], "contact.adhesion", None, "this key is missing")
-        return read(data, *given)
-
-    monkeypatch.setattr(specification, "read_problem", demanding)
-    assert problem.digest != before
+    problem = vf.Problem.from_dict(vf.example("section6").to_dict()).with_keys({"contact.adhesion": "1/3"})
+    assert vf.Problem.from_dict(problem.to_dict()) == problem
+    assert 'adhesion = "1/3"' in problem.to_toml()
+    with pytest.raises(vf.ProblemError, match=r"contact\.adhesion = -1: needed a number >= 0"):
+        problem.with_keys({"contact.adhesion": "-1"})
+    with pytest.raises(vf.ProblemError, match="did you mean 'adhesion'"):
+        problem.with_keys({"contact.adhesoin": "1"})
 
 
-OF_0_1_0 = [
+def test_a_key_that_is_not_said_to_be_later_counts(monkeypatch):
+    before = vf.example("two-bars").digest
+    later_contact(monkeypatch, CountingContact)
+    assert vf.Problem.from_dict(vf.example("two-bars").to_dict()).digest != before
+
+
+OF_THE_FIRST_RELEASE = [
     ("contact", "gap"),
     ("contact", "law"),
     ("iteration", "tolerance"),
@@ -115,14 +85,10 @@ OF_0_1_0 = [
 ]
 
 
-@pytest.mark.parametrize(("table", "key"), OF_0_1_0)
-def test_keys_of_0_1_0_count_with_their_defaults_too(monkeypatch, table, key):
+@pytest.mark.parametrize(("table", "key"), OF_THE_FIRST_RELEASE)
+def test_keys_of_the_first_release_count_with_their_defaults_too(table, key):
     """A release that changes a default leaves digests as they are, and tells its problems from those before."""
-    problem, tables = vf.example("section6"), specification.tables
-    before = problem.digest
-    less = lambda data: {name: value for name, value in data.items() if name != key}
-    monkeypatch.setattr(specification, "tables", lambda p: tables(p) | {table: less(tables(p)[table])})
-    assert problem.digest != before
+    assert key in vf.example("section6").tables(counting=True)[table]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,6 +32,8 @@ def put(problem, key, value):
     table, _, name = key.rpartition(".")
     if not table:
         return dataclasses.replace(problem, **{name: value})
+    if table == "contact":
+        return dataclasses.replace(problem, contacts=(dataclasses.replace(problem.contact, **{name: value}),))
     return dataclasses.replace(problem, **{table: dataclasses.replace(getattr(problem, table), **{name: value})})
 
 
