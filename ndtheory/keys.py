@@ -33,7 +33,7 @@ from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 
-#: The types of Python as those of the tables; a class of parts is named, or an object with keys of its own.
+#: The types of Python in the words of the tables; a class of parts is named, or an object with its keys.
 TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"}
 
 #: The types that have a unit.
@@ -59,7 +59,7 @@ class Key:
         When the value is null, and when the key is left out; None for never.
     why : str or function of the result, or None
         The reason beside a null; the result's own ``reason`` by this name goes first, ``null`` comes last.  None where
-        no reason stands beside it.
+        there is no reason beside it.
     name : str
         Its name, with dots for objects inside, where that is not the name of the field.
     of : function, optional
@@ -67,7 +67,7 @@ class Key:
     type : str
         Its type, where that does not follow from the annotation.
     spread : bool
-        True if the value is a part whose keys stand among those of the result.
+        True if the keys of the value, a part, are among the result's.
     inside : dict of Key, optional
         The keys of a dictionary, or of each one in a list, with their types.
     """
@@ -93,7 +93,7 @@ class Key:
 
     @property
     def explained(self) -> bool:
-        """True if a reason stands beside a null."""
+        """True if there is a reason beside a null."""
         return self.null is not None and self.why is not None
 
     def row(self, name: str, kind: str) -> Row:
@@ -115,7 +115,7 @@ def key(says: str = "", *, default: Any = MISSING, default_factory: Any = MISSIN
 def says(says: str = "", **more: Any) -> Callable[[F], F]:
     """Make a property a key: this decorator stands below ``@property``; arguments as of :class:`Key`.
 
-    Without a meaning the key has that of the docstring's first paragraph.
+    Without a meaning the key has the docstring's first paragraph.
     """
 
     def mark(function: F) -> F:
@@ -137,7 +137,7 @@ def derived(says: str, of: Callable[[Any], Any], hint: Any = str, **more: Any) -
 
 
 class Part:
-    """A part of documents.  Its table has the name ``part``; without one its keys stand in the tables that have it."""
+    """A part of documents.  Its table has the name ``part``; without one its keys are in the tables that have it."""
 
     part: ClassVar[str] = ""
 

@@ -116,7 +116,7 @@ def test_a_crash_names_the_tracker_of_the_metadata(call, write, monkeypatch, bef
     [
         ("run", "contact.step.ContactStep", ContactError("no certificate")),
         ("compare", "contact.step.ContactStep", ContactError("no certificate")),
-        ("solve", "monolithic.ContactSystem", SolveError("no certificate")),
+        ("solve", "algorithm.monolithic.ContactSystem", SolveError("no certificate")),
     ],
     ids=["run", "compare", "solve"],
 )
