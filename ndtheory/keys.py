@@ -33,7 +33,7 @@ from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 
-#: The types of Python in the words of the tables; a class of parts is named, or an object with its keys.
+#: Names of types of Python in the tables; a class of parts is named, or is an object whose keys follow.
 TYPES = {bool: "truth", int: "integer", float: "number", str: "text", Path: "text", Fraction: "exact", Any: "free"}
 
 #: The types that have a unit.
@@ -59,7 +59,7 @@ class Key:
         When the value is null, and when the key is left out; None for never.
     why : str or function of the result, or None
         The reason beside a null; the result's own ``reason`` by this name goes first, ``null`` comes last.  None where
-        there is no reason beside it.
+        no reason is given beside it.
     name : str
         Its name, with dots for objects inside, where that is not the name of the field.
     of : function, optional
@@ -67,7 +67,7 @@ class Key:
     type : str
         Its type, where that does not follow from the annotation.
     spread : bool
-        True if the keys of the value, a part, are among the result's.
+        True if the value is a part whose keys are keys of the result.
     inside : dict of Key, optional
         The keys of a dictionary, or of each one in a list, with their types.
     """
@@ -93,7 +93,7 @@ class Key:
 
     @property
     def explained(self) -> bool:
-        """True if there is a reason beside a null."""
+        """True if a reason is given beside a null."""
         return self.null is not None and self.why is not None
 
     def row(self, name: str, kind: str) -> Row:
@@ -115,7 +115,7 @@ def key(says: str = "", *, default: Any = MISSING, default_factory: Any = MISSIN
 def says(says: str = "", **more: Any) -> Callable[[F], F]:
     """Make a property a key: this decorator stands below ``@property``; arguments as of :class:`Key`.
 
-    Without a meaning the key has the docstring's first paragraph.
+    Without a meaning the first paragraph of the docstring is the meaning.
     """
 
     def mark(function: F) -> F:
@@ -137,7 +137,7 @@ def derived(says: str, of: Callable[[Any], Any], hint: Any = str, **more: Any) -
 
 
 class Part:
-    """A part of documents.  Its table has the name ``part``; without one its keys are in the tables that have it."""
+    """A part of documents.  Its table is called ``part``; without one its keys are in the tables that have it."""
 
     part: ClassVar[str] = ""
 
@@ -283,11 +283,12 @@ def _rows(cls: type) -> Iterator[Row]:
         if one.spread:
             yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,), says=one.says),)
             continue
+        if inside and kind.startswith("map of "):  # its members have a row
+            name, kind = f"{name}.*", kind.removeprefix("map of ")
         yield one.row(name, kind)
         yield from (each.row(f"{name}.{below}", each.type) for below, each in one.inside.items())
         for row in _rows(inside) if inside else ():
-            below = f"{name}.*" if kind.startswith("map") else name
-            yield replace(row, keys=tuple(f"{below}.{each}" for each in row.keys))
+            yield replace(row, keys=tuple(f"{name}.{each}" for each in row.keys))
     among = [annotation(cls, attribute) for attribute, one in keys(cls).items() if one.spread]
     for above in set(_explained(cls)).difference(*map(_explained, among)):  # these bring their own row
         yield Row(keys=(f"{above}.reason".lstrip("."),), type="map of text", says="why a key is null")

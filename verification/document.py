@@ -50,7 +50,9 @@ class Document(Value, keys.Part, ABC):
         origin: dict[str, Any] = {} if self.problem is None else {"problem": self.problem.to_dict()}
         if self.problem is not None and self.problem.contact.lines:
             origin["colours"] = [list(self.problem.numbers(body)) for body in (1, 2)]
-        return {"schema": self.schema, "version": __version__, "units": dict(self.units), **origin, **self.content()}
+        kind = {"kind": self.kind} if type(self).kind else {}
+        head = {"schema": self.schema, "version": __version__, "units": dict(self.units)}
+        return {**head, **origin, **kind, **self.content()}
 
     def to_json(self) -> str:
         """Return the document as JSON text; every number is finite."""

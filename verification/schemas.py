@@ -61,7 +61,8 @@ def header(cls: type[Document]) -> tuple[Row, ...]:
     base, hint = keys.written(cls, "problem")
     says, absent = "what the result is about", "where that is no problem file" if "None" in str(hint) else None
     problem = Row(keys=("problem",), type="Problem", says=says, absent=absent)
-    return (included("Header"),) if base is Document else (included("Header"), problem)
+    kind = [Row(keys=("kind",), type="text", says=f"`{cls.kind}`")] if cls.kind else []
+    return (included("Header"), *([] if base is Document else [problem]), *kind)
 
 
 def included(part: str) -> Row:
