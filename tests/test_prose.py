@@ -39,7 +39,7 @@ MOST = {
     "code that knows or speaks": 5,
     "a chain of that of": 10,
     "alone at the end": 5,
-    "of its own": 8,
+    "of its own": 6,
     "stands for is": 1,
     "dear": 1,
     "a sentence without its head": 0,

@@ -15,9 +15,9 @@ from verification.algorithm.reference import Reference, by_cvxpy_alone
 from verification.algorithm.relaxation import Constant
 from verification.algorithm.runs import Run, check_memory, run
 from verification.algorithm.theta import Choice, choose
-from verification.bounds.bound import BY_NAME, NOT_ASKED, BoundResult, Subject
+from verification.bounds.bound import NOT_ASKED, BoundResult, Subject
 from verification.bounds.losses import Losses
-from verification.bounds.table import EnergyOfPair, chosen
+from verification.bounds.table import BY_NAME, EnergyOfPair, chosen
 from verification.bounds.verdicts import Judgement, judge_bound, judge_forecast
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver

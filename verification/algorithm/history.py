@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -27,7 +27,8 @@ from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.runs import Run, check_memory, run_from
 from verification.algorithm.start import LEAST, Start, begin_at, tied_size
 from verification.algorithm.theta import choose
-from verification.bounds.bound import BY_NAME, BoundResult, Subject
+from verification.bounds.bound import BoundResult, Subject
+from verification.bounds.table import BY_NAME
 from verification.bounds.verdicts import Judgement, judge_bound
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
@@ -276,7 +277,7 @@ class History(Document):
     @property
     @says()
     def warnings(self) -> list[str]:
-        """What to know before trusting the numbers.
+        """Facts to know before trusting the numbers.
 
         Of the first increment, and the worst checks.
         """
@@ -405,25 +406,15 @@ def march(
     >>> [(each.time, each.outcome) for each in done.increments]
     [(0.5, 'converged'), (1.0, 'converged')]
     """
-    like = problem if isinstance(problem, ContactPair) else None
-    if like is not None and like.problem is None:
-        raise ValueError("this pair is made from matrices: needed a problem with [[step]] tables")
-    given = like.problem if like is not None else problem
-    whole = given if isinstance(given, Problem) else load(given)  # type: ignore[arg-type]
-    if not whole.steps:
-        raise whole.refuse("step", None, "needed [[step]] tables, one for each step of the loading history")
-    if method not in ("iteration", "monolithic"):
+    if method not in get_args(Method):
         raise ValueError(f"method {method!r}: needed 'iteration' or 'monolithic'")
+    whole, rest = _at_rest(problem)
     path = list(moments(whole))
-    rest = at_rest(whole)
-    if like is not None and rest.prescribes != whole.prescribes:
-        raise whole.refuse("step", None, "needed a pair whose bodies prescribe the sides that the first step does")
-    pair = like.under(rest) if like is not None else pair_from(rest) if method == "iteration" else None
-    bodies = discretise(rest) if pair is None else pair.on_meshes()
-    for moment in path:
-        if moment.time.denominator == 1:
-            bodies.under(moment.problem, None)  # refuses sides that contradict each other at the end of a step
-    by = _Iteration(pair, theta, rule, solver) if pair is not None and method == "iteration" else None
+    start = pair_from(rest) if method == "iteration" and isinstance(rest, Problem) else rest
+    bodies = discretise(start) if isinstance(start, Problem) else start.on_meshes()
+    for end in _ends(path):
+        bodies.under(end, None)  # refuses sides that contradict each other
+    by = _Iteration(start, theta, rule, solver) if method == "iteration" and isinstance(start, ContactPair) else None
     increments = _by_global_method(bodies, path) if by is None else by.increments(path)
     done: list[Increment] = []
     ended, interrupted = "", False
@@ -454,6 +445,27 @@ def march(
     )
 
 
+def _at_rest(problem: Problem | ContactPair | Path | str) -> tuple[Problem, Problem | ContactPair]:
+    """Return a problem with its steps, and the problem or its pair before the first one."""
+    whole = problem.problem if isinstance(problem, ContactPair) else problem
+    if whole is None:
+        raise ValueError("this pair is made from matrices: needed a problem with [[step]] tables")
+    whole = whole if isinstance(whole, Problem) else load(whole)
+    if not whole.steps:
+        raise whole.refuse("step", None, "needed [[step]] tables, one for each step of the loading history")
+    rest = at_rest(whole)
+    if not isinstance(problem, ContactPair):
+        return whole, rest
+    if rest.prescribes != whole.prescribes:
+        raise whole.refuse("step", None, "needed a pair whose bodies prescribe the sides that the first step does")
+    return whole, problem.under(rest)
+
+
+def _ends(path: list[Moment]) -> list[Problem]:
+    """Return the problems at the ends of steps, between which loads change in proportion."""
+    return [moment.problem for moment in path if moment.time.denominator == 1]
+
+
 def _slipped(before: ContactFields | None, interface: Interface) -> Floats | None:
     return None if before is None else before.slip[: interface.contact.t]
 
@@ -478,10 +490,9 @@ class _Iteration:
         subject = Subject.of(pair, self.measured)
         calculated = {name: bound for name, bound in BOUNDS.items() if bound.calculated}
         self.bounds = {name: bound.evaluate(subject, self._choice.theta) for name, bound in calculated.items()}
-        other = (
-            "" if isinstance(self._rule, Constant) else f"the bounds are about a constant theta, not {self._rule.name}"
-        )
-        self._outside = "; ".join(filter(None, [*pair.outside, other]))
+        constant = isinstance(self._rule, Constant)
+        other = [] if constant else [f"the bounds are about a constant theta, not {self._rule.name}"]
+        self._outside = "; ".join([*pair.outside, *other])
         proved = [bound.factor for name, bound in self.bounds.items() if not BOUNDS[name].finding]
         below = [factor.value for factor in proved if factor is not None and factor.value < 1]
         self._factor = min(below, default=None)
@@ -492,9 +503,8 @@ class _Iteration:
         systems = Systems(contact.schur, contact.free, motions)
         before: Run | None = None
         largest = 0.0
-        ends = [moment.problem for moment in path if moment.time.denominator == 1]
-        # loads change in proportion between these ends, where a norm of what follows from them is largest
-        tied = max(tied_size(self._pair.under(problem, None)) for problem in ends)
+        # a norm of what follows from the loads is largest at an end
+        tied = max(tied_size(self._pair.under(problem, None)) for problem in _ends(path))
         for moment in path:
             earlier = None if before is None else before.contact
             pair = self._pair.under(moment.problem, _slipped(earlier, self._pair.interface))

@@ -112,7 +112,7 @@ class Solution(Document):
     @property
     @says()
     def warnings(self) -> list[str]:
-        """What to know before trusting the numbers."""
+        """Facts to know before trusting the numbers."""
         return [*self.bodies.warnings, *self.contact.warnings(self.units["length"]), *self.checks.warnings]
 
     def plot(self, **options: Any) -> Figure:

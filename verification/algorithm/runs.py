@@ -392,7 +392,7 @@ class Run(Document):
     @property
     @says()
     def warnings(self) -> list[str]:
-        """What to know before trusting the numbers."""
+        """Facts to know before trusting the numbers."""
         tied = [self.start.why] if self.start.source == "tied" else []
         state = [*self.contact.warnings(self.units["length"]), *self.checks.warnings] if self.converged else []
         return self.pair.warnings + self.choice.warnings + tied + state

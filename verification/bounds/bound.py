@@ -11,14 +11,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
 from heapq import heappop, heappush
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
 from ndtheory.bounds import FACTOR, Edition
-from ndtheory.keys import Key, Part, document, key, plain, says
+from ndtheory.keys import Part, document, key, plain, says
 from ndtheory.number import Level, Numeric, above, below
 from verification.machine.progress import Progress, silent
 
@@ -40,17 +39,6 @@ FIRST = (1.0, 0.75, 0.5, 0.25, 1e-4)
 
 #: Why a bound that was left out has no result.
 NOT_ASKED = "not asked for"
-
-_where = partial(Key, null="where it was not asked for, or was not worked out")
-
-#: The documents of bounds by name.
-BY_NAME = {
-    "printed": _where(says="the theorem as printed", type="Bound of Section 5"),
-    "repaired": _where(says="the theorem as repaired", type="Bound of Section 5"),
-    "energy": _where(says="the theorem in energy norms", type="Bound in energy norms"),
-    "*": _where(says="a bound of your own that follows from constants", type="Registered bound"),
-}
-
 
 _BELOW = {"null": "where it was not worked out", "why": "not worked out", "default": None}
 
@@ -321,7 +309,7 @@ class Bound(ABC):
         """
         return None
 
-    def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
+    def objects(self, result: BoundResult, measured: Measured) -> dict[str, Any]:
         """The objects that the document of a comparison has of this bound beside ``bounds``, by their keys.
 
         An object is None where the bound was not worked out; the document then says why.

@@ -8,12 +8,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import PRINTED, REPAIRED, Constants, EnergyBounds, EnergyConstants, Number, evaluate, evaluate_energy
-from ndtheory.bounds import Edition
+from ndtheory.bounds import Answer, Edition
 from ndtheory.constants import relaxation_factor
 from ndtheory.keys import Key, Part, derived, key, says
-from ndtheory.number import Numeric, weakest
+from ndtheory.number import Level, Numeric, weakest
 from ndtheory.texts import did_you_mean
-from verification.bounds.bound import BY_NAME, Bound, BoundResult, Subject, Thresholds
+from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds
 from verification.document import Document
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
@@ -23,6 +23,16 @@ if TYPE_CHECKING:
 
 #: The constants that may be given to the calculator, for Section 5 and for the theorem in energy norms.
 SECTION_5, ENERGY = ("m", "M", "C_R", "C_s", "C_tr", "k", "C_K"), ("rho", "kappa_1", "kappa_2")
+
+_where = partial(Key, null="where it was not asked for, or was not worked out")
+
+#: The documents of bounds by name.
+BY_NAME = {
+    "printed": _where(says="the theorem as printed", type="Bound of Section 5"),
+    "repaired": _where(says="the theorem as repaired", type="Bound of Section 5"),
+    "energy": _where(says="the theorem in energy norms", type="Bound in energy norms"),
+    "*": _where(says="a registered bound that follows from constants", type="Registered bound"),
+}
 
 _given = partial(Key, says="as given", type="number")
 
@@ -40,7 +50,25 @@ INPUTS = {
 NO_SUM = "needed M >= 2 m, as M is the sum of the constants of both bodies (4.2)"
 
 
-class Section5(Bound):
+class Calculation(Bound):
+    """A bound that follows from constants by one of the two theorems."""
+
+    def answer(self, found: Answer, level: Level, *, proved: bool = True, **more: Any) -> BoundResult:
+        """The result for an answer from constants of a level."""
+        return BoundResult(
+            name=self.name,
+            proved=proved,
+            theta=found.theta,
+            factor=found.factor,
+            one_minus_factor=found.one_minus_factor,
+            interval=found.interval_proved or found.interval,
+            interval_level=weakest([level, "verified"]) if found.interval_proved else "float",
+            detail=found,
+            **more,
+        )
+
+
+class Section5(Calculation):
     """An edition of Proposition 5.6."""
 
     edition: ClassVar[Edition]
@@ -57,18 +85,7 @@ class Section5(Bound):
             why = _why_not(found.interval, found.C2, given, found.theta, subject.varies)
             if self.of_unit and subject.measured is not None:
                 why += f" (in {subject.measured.units['stress']})"
-        return BoundResult(
-            name=self.name,
-            proved=found.proved,
-            theta=found.theta,
-            factor=found.factor,
-            one_minus_factor=found.one_minus_factor,
-            interval=found.interval_proved or found.interval,
-            interval_level=weakest([subject.constants.level, "verified"]) if found.interval_proved else "float",
-            friction=friction,
-            why=why,
-            detail=found,
-        )
+        return self.answer(found, subject.constants.level, proved=found.proved, friction=friction, why=why)
 
 
 class Printed(Section5):
@@ -90,7 +107,7 @@ class Repaired(Section5):
     certifies = True
 
 
-class Energy(Bound):
+class Energy(Calculation):
     """The same proof as Section 5, with no constant larger than it must be; see ``docs/energy.md``."""
 
     name, words = "energy", "the theorem in energy norms"
@@ -110,23 +127,13 @@ class Energy(Bound):
             without = measured.C_t1 is None  # no friction is allowed
             if theta is not None and found.factor is None:
                 why = _why_not(found.interval, friction.some, measured.friction, found.theta, subject.varies)
-        return BoundResult(
-            name=self.name,
-            proved=True,
-            theta=found.theta,
-            factor=found.factor,
-            one_minus_factor=found.one_minus_factor,
-            interval=found.interval_proved or found.interval,
-            interval_level=weakest([subject.energy.level, "verified"]) if found.interval_proved else "float",
-            friction=Thresholds(on="any") if friction.every is None and not without else friction,
-            why=why,
-            detail=found,
-        )
+        friction = Thresholds(on="any") if friction.every is None and not without else friction
+        return self.answer(found, subject.energy.level, friction=friction, why=why)
 
-    def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
+    def objects(self, result: BoundResult, measured: Measured) -> dict[str, Any]:
         """Its document with both rho and both thresholds on k."""
         found = result.detail
-        return {self.name: None if found is None else EnergyOfPair(found=found, measured=measured).to_dict()}
+        return {self.name: None if found is None else EnergyOfPair(found=found, measured=measured)}
 
 
 _THRESHOLD: dict[str, Any] = {

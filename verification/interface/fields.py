@@ -119,29 +119,22 @@ class ContactFields(Value, Part):
 
     def in_order(self) -> ContactFields:
         """Return the same fields with each of several lines as the file has it: the first of its bodies is body 1."""
-        order, turned = np.arange(len(self.x)), np.zeros(len(self.x), dtype=bool)
-        for line in self.lines:
-            if line.flipped:
-                order[line.contact], turned[line.contact] = order[line.contact][::-1], True
-        if not turned.any():
+        turned = [line.contact for line in self.lines if line.flipped]
+        if not turned:
             return self
-        taken, s = self.at(order), self.s[order]
-        for line in self.lines:  # s from the other end
-            if line.flipped:
-                s[line.contact] = self.s[line.contact][-1] - s[line.contact]
-        normal = np.where(turned[:, None], -1.0, 1.0) * taken.normal + 0.0
-        lines = tuple(replace(line, flipped=False) for line in self.lines)
-        return copied(self, **taken.arrays | {"s": s, "normal": normal}, status=taken.status, lines=lines)
+        order = np.arange(len(self.x))
+        for nodes in turned:
+            order[nodes] = order[nodes][::-1]
+        found = self._at(order)
+        for nodes in turned:  # s from the other end
+            found["s"][nodes] = self.s[nodes][-1] - found["s"][nodes]
+            found["normal"][nodes] = 0.0 - found["normal"][nodes]
+        return copied(self, **found, lines=tuple(replace(line, flipped=False) for line in self.lines))
 
-    @property
-    def arrays(self) -> dict[str, Any]:
-        """The arrays by the names of their fields."""
-        return {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-
-    def at(self, nodes: Ints) -> ContactFields:
-        """Return the fields at some nodes."""
-        arrays = {name: value[nodes] for name, value in self.arrays.items()}
-        return replace(self, **arrays, status=tuple(self.status[i] for i in nodes))
+    def _at(self, nodes: Ints) -> dict[str, Any]:
+        """The values at some nodes, by the names of the fields."""
+        arrays = {name: value[nodes] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return {**arrays, "status": tuple(self.status[i] for i in nodes)}
 
     def unrolled(self) -> ContactFields:
         """Return the fields with s in place of x; several lines follow each other, with NaN between them."""
@@ -154,11 +147,11 @@ class ContactFields(Value, Part):
             x.append(np.append(s + shift, np.nan))
             order.append(np.append(np.arange(len(own.x))[line.contact], line.contact.stop - 1))
             shift += 1.05 * float(s[-1])  # a gap that is seen
-        return replace(own.at(np.concatenate(order)), x=np.concatenate(x), lines=())
+        return replace(own, **{**own._at(np.concatenate(order)), "x": np.concatenate(x)}, lines=())
 
     def between(self, low: float, high: float) -> ContactFields:
         """Return the part of Gamma_c from one position to another."""
-        return replace(self.at(np.flatnonzero((self.x >= low) & (self.x <= high))), lines=())
+        return replace(self, **self._at(np.flatnonzero((self.x >= low) & (self.x <= high))), lines=())
 
     @property
     @says(inside=dict.fromkeys(STATES, Key(says="number of nodes in each state", type="integer")))

@@ -337,7 +337,7 @@ class Semidefinite(Part):
     @property
     @says()
     def certified(self) -> bool:
-        """Whether `lipschitz` is proved, at level `verified`.
+        """True if `lipschitz` is proved, at level `verified`.
 
         By the multipliers of one program, for all pieces of T at once.
         """
