@@ -1,4 +1,4 @@
-"""Whether the state at the end of a run has arrived: its distance from contact, measured in its own traction.
+"""Arrival of the state at the end of a run: its distance from contact, measured in its own traction.
 
 The joined state at g consists of both displacements, u2 from step I and u1 from step II, and of g itself as the
 traction between the bodies.  A residual ``|||T g - g|||`` that is small beside the first step does not bound it: with

@@ -1,6 +1,6 @@
 """The one loop: states of an iteration one by one, up to the one at which a test ends it, with an outcome.
 
-Runs, couplings of two solvers, methods on a spectrum and the rows of a sweep differ in their states alone.
+Runs, couplings of two solvers, methods on a spectrum and the rows of a sweep bring only their states.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ RUNAWAY = 1e8
 
 
 class Outcome(StrEnum):
-    """The outcome of an iteration: a text, which has words of its own.
+    """The outcome of an iteration: a text, with words for sentences.
 
     Attributes
     ----------

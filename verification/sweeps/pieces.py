@@ -49,7 +49,7 @@ class Steps:
     piece : tuple
         The key of the piece.
     found : Iterate or None
-        The one step, where it was evaluated alone.
+        The one step, where it was evaluated and not taken with others.
     """
 
     g: Floats

@@ -1,4 +1,4 @@
-"""Workers that make the rows of a sweep: this process, several on this machine, or those of a dask scheduler."""
+"""Workers that make the rows of a sweep: this process, several on this machine, or workers of dask."""
 
 from __future__ import annotations
 
