@@ -60,7 +60,7 @@ class Key:
     type : str
         Its type, where that does not follow from the annotation.
     table : type, optional
-        The class whose keys stand in the value, where that does not follow from the annotation.
+        The class that has the keys inside, where the annotation does not say.
     spread : bool
         True if the value is a part whose keys stand among those of the result.
     """

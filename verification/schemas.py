@@ -38,7 +38,7 @@ HEADER = (
     Row(keys=("problem",), type="Problem", says="what the result is about", absent="where that is no problem file"),
 )
 
-#: What stands in the type of a part, or a list of them, between both.
+#: The words between two types, of a part and of a list of parts.
 EITHER = ", or list of "
 
 #: A reference of the site: its role, its text where it has one, its target.
