@@ -67,7 +67,7 @@ class Key:
     type : str
         Its type, where that does not follow from the annotation.
     table : type, optional
-        The class whose keys stand in the value, where that does not follow from the annotation.
+        The class that has the keys inside, where the annotation does not say.
     spread : bool
         True if the value is a part whose keys are keys of the result.
     inside : dict of Key, optional

@@ -31,7 +31,7 @@ TYPES: dict[str, JsonSchema] = {
     "free": {"type": ["array", "boolean", "number", "object", "string"]},
 }
 
-#: What stands in the type of a part, or a list of them, between both.
+#: The words between two types, of a part and of a list of parts.
 EITHER = ", or list of "
 
 #: A reference of the site: its role, its text where it has one, its target.

@@ -52,7 +52,7 @@ def file_table(name: str) -> str:
 
 def _file_lines(cls: type, above: str = "", default: str = "") -> Iterator[str]:
     for name, one in entries(cls).items():
-        if not (one.read or one.reader or one.shown):  # it has a table of its own
+        if not (one.read or one.reader or one.shown):  # it has another table
             continue
         key = keys.keys(cls)[name]
         inside = key.table or keys.named_type(keys.annotation(cls, name))[1]

@@ -27,7 +27,7 @@ from verification.problem.writing import plain
 T = TypeVar("T")
 V = TypeVar("V")
 
-#: The default of a key that the file must have, and that of a table which may be missing: it is read as an empty one.
+#: The default of a key that the file must have; the default of a table that may be missing and is then read as empty.
 REQUIRED: Any = object()
 EMPTY: Any = object()
 
@@ -61,7 +61,7 @@ class ReadOnly(Mapping[str, V]):
 
 
 class At:
-    """Where a key is read: its table, the values read there before it, and what the tables around it say."""
+    """The place of a key: its table, the values read there before it, and what the tables around it say."""
 
     def __init__(self, table: TomlTable, around: Mapping[str, Any]) -> None:
         self.table, self.name = table, ""
@@ -80,7 +80,7 @@ class At:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """How a key is read and written.
+    """The reading and the writing of a key.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ from verification.problem.writing import plain, toml
 #: A key by its tables and its name.
 Key = tuple[str, ...]
 
-#: The tables whose keys :meth:`Problem.changed` takes by their names alone.
+#: The tables whose keys :meth:`Problem.changed` takes by name, without the table.
 TABLES: dict[Key, type[Entries]] = {("contact",): ContactSpec, ("iteration",): IterationSpec, (): ProblemSpec}
 
 #: Stands where a value would, while a key is read.

@@ -621,7 +621,7 @@ class ProblemSpec(Entries):
         """Return the error for a key of this problem."""
         return ProblemError(self.source, key, value, needed)
 
-    # --- bodies: those of the file, and the two of the iteration ---
+    # --- bodies of the file, and the two bodies of the iteration ---
 
     @property
     def several(self) -> bool:

@@ -57,7 +57,7 @@ def section_6(name: str, finer: int = 1, friction: str = "0.2") -> tuple[Contact
         problem,
         body1=replace(problem.body1, young=Fraction(young1), cells=cells(problem.body1)),
         body2=replace(problem.body2, young=Fraction(young2), cells=cells(problem.body2), x=x),
-        contact=replace(problem.contact, friction=Fraction(friction)),
+        contacts=(replace(problem.contact, friction=Fraction(friction)),),
         iteration=replace(problem.iteration, neumann_body=neumann_body),
     )
     pair = pair_from(problem)
