@@ -102,7 +102,6 @@ def everywhere() -> list[Found]:
     """Places in the pages and packages."""
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
     pages += sorted((ROOT / "docs" / "examples").glob("*.md"))
-    pages.append(ROOT / "verification" / "schemas.toml")  # tables of a page
     modules = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
     read = lambda path: (path.relative_to(ROOT).as_posix(), path.read_text("utf-8"))
     return [

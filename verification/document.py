@@ -6,6 +6,7 @@ import html
 import json
 from abc import ABC
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import __version__, keys
@@ -18,6 +19,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Figure
 
     from verification.problem import Problem
+
+
+LABEL = keys.Key(says="labels", type="text")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header(keys.Part):
+    """The keys with which every document begins."""
+
+    part = "Header"
+
+    schema: str = keys.key("`ndtheory.` and a name, `/` and a version")
+    version: str = keys.key("of this program", default=__version__)
+    units: dict[str, str] = keys.key(inside={"length": LABEL, "stress": LABEL})
+    colours: list[list[int]] | None = keys.key(
+        "the bodies of the file that `body1` and `body2` stand for, and 1 and 2 under `neumann_body`",
+        unit="",
+        absent="of two bodies",
+    )
 
 
 class Document(Value, keys.Part, ABC):
@@ -47,11 +67,11 @@ class Document(Value, keys.Part, ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the document as plain dictionaries, lists and numbers."""
-        origin: dict[str, Any] = {} if self.problem is None else {"problem": self.problem.to_dict()}
-        if self.problem is not None and self.problem.several:
-            origin["colours"] = [list(self.problem.numbers(body)) for body in (1, 2)]
+        problem, several = self.problem, self.problem is not None and self.problem.several
+        colours = [list(problem.numbers(body)) for body in (1, 2)] if problem is not None and several else None
+        head = Header(schema=self.schema, units=dict(self.units), colours=colours).to_dict()
+        origin = {} if problem is None else {"problem": problem.to_dict()}
         kind = {"kind": self.kind} if type(self).kind else {}
-        head = {"schema": self.schema, "version": __version__, "units": dict(self.units)}
         return {**head, **origin, **kind, **self.content()}
 
     def to_json(self) -> str:

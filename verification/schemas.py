@@ -6,10 +6,8 @@ The tables are made from the keys of the classes of results (:mod:`ndtheory.keys
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 from ndtheory import keys
@@ -41,19 +39,13 @@ _REFERENCE = re.compile(r"\{(\w+)\}`(?:([^`<]+) <[^`>]+>|([^`]+))`")
 @cache
 def tables() -> dict[str, tuple[Row, ...]]:
     """Return the rows of each table, by the schema of a document or the name of a part."""
-    data = tomllib.loads(files("verification").joinpath("schemas.toml").read_text("utf-8"))
-    found = {
-        name: tuple(Row(keys=tuple(names.split(", ")), **row) for names, row in each.items())
-        for name, each in data.items()
-    }
     registry.load("documents", "")
     classes = {each.key_table(): each for each in subclasses(Document) if keys.keys(each) and vars(each).get("schema")}
     parts = {part: each for each in subclasses(keys.Part) if (part := vars(each).get("part"))}
-    written = {name: found.pop(name) for name in list(found) if name.startswith("ndtheory.")}
     made = {
         name: header(cls) + ((included(cls.part),) if cls.part else keys.rows(cls)) for name, cls in classes.items()
     }
-    return written | made | found | {name: keys.rows(cls) for name, cls in parts.items()}
+    return made | {name: keys.rows(cls) for name, cls in parts.items()}
 
 
 def header(cls: type[Document]) -> tuple[Row, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
 from functools import cached_property
@@ -20,6 +20,7 @@ from flint import ctx
 from numpy.typing import NDArray
 
 from fem1d2d.element import lacks
+from ndtheory.keys import Part, key
 from verification.certificate.check import check, surface_stiffness
 from verification.certificate.exact_bodies import ExactInterface, NotExact, exact_normals, exact_points
 from verification.constants.measured import FROM_MATRICES
@@ -252,8 +253,8 @@ def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any
     joined = ExactInterface(pair, *(along if pair.contact_body == 1 else along[::-1]))
     rows = lambda matrix: None if matrix is None else [_texts(row) for row in matrix]
     return {
-        "body1": _described(problem.body1, meshed[0], points[0]),
-        "body2": _described(problem.body2, meshed[1], points[1]),
+        "body1": RationalBody.of(problem.body1, meshed[0], points[0]).to_dict(),
+        "body2": RationalBody.of(problem.body2, meshed[1], points[1]).to_dict(),
         "neumann_body": pair.neumann_body,
         "friction": str(pair.friction),
         "weights": _texts(joined.grid.weights),
@@ -276,17 +277,40 @@ def same(one: Any, other: Any) -> bool:
     return all(same(one.get(key), other.get(key)) for key in one.keys() | other.keys())
 
 
-def _described(spec: BodySpec, body: Body, points: NDArray[Any]) -> dict[str, Any]:
-    normals = exact_normals(body.normals)
-    return {
-        **({} if normals is None else {"normals": [_texts(normal) for normal in normals]}),
-        "points": [_texts(point) for point in points],
-        "cells": body.mesh.cells.tolist(),
-        "held": np.argwhere(body.known.held).tolist(),
-        "surface": body.nodes.tolist(),
-        "young": str(spec.moduli.young),
-        "poisson": str(spec.moduli.poisson),
-    }
+@dataclass(frozen=True, kw_only=True)
+class RationalBody(Part):
+    """A body in rationals, as texts."""
+
+    part = "Body in rationals"
+
+    points: list[Any] = key("x and y of each node", unit="length", type="list of free")
+    cells: list[Any] = key("three nodes of each triangle, anticlockwise", type="list of free")
+    held: list[Any] = key(r"node and component (0 or 1) of each unknown that $\Gamma_u$ holds", type="list of free")
+    surface: list[int] = key(r"the nodes on $\Gamma_c$ in the direction of $s$", unit="")
+    normals: list[Any] | None = key(
+        "unit normals at these nodes, rational and equal to the measured ones up to rounding",
+        unit="1",
+        type="list of free",
+        absent="where all are (0, 1)",
+    )
+    young: str = key(
+        "E, of plane strain; of plates in plane stress $E'$ of the {doc}`substitution <problem_file>`", unit="stress"
+    )
+    poisson: str = key(r"$\nu$, or $\nu'$", unit="1")
+
+    @classmethod
+    def of(cls, spec: BodySpec, body: Body, points: NDArray[Any]) -> RationalBody:
+        """A body of a problem on its mesh."""
+        normals = exact_normals(body.normals)
+        return cls(
+            points=[_texts(point) for point in points],
+            cells=body.mesh.cells.tolist(),
+            held=np.argwhere(body.known.held).tolist(),
+            surface=body.nodes.tolist(),
+            normals=None if normals is None else [_texts(normal) for normal in normals],
+            young=str(spec.moduli.young),
+            poisson=str(spec.moduli.poisson),
+        )
 
 
 def _texts(values: Iterable[Any]) -> list[str]:
