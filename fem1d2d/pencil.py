@@ -238,7 +238,7 @@ def extremes_by_solves(
 
 
 class _Ritz(NamedTuple):
-    """What Lanczos ends with: coefficients of the Ritz vectors, as columns, in the rows of Y and of ``X = Y B^-1``."""
+    """The end of Lanczos: coefficients of the Ritz vectors, as columns, in the rows of Y and of ``X = Y B^-1``."""
 
     vectors: Floats
     Y: Floats

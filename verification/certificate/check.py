@@ -158,8 +158,8 @@ def neumann_and_contact(discrete: Json) -> list[Json]:
 def contact_positions(discrete: Json) -> tuple[list[arb], list[arb]]:
     """Positions of the contact nodes and the Neumann nodes, along x or along their lines: as the weights have it.
 
-    The weights must be those of the trapezoid rule for one of these, and a kernel with a radius its hat.  Positions may
-    be rounded: both are compared up to 1e-6, and the proof uses the numbers that are listed.
+    The weights must belong to the trapezoid rule for one of these, and a kernel with a radius must be its hat. 
+    Positions may be rounded: both are compared up to 1e-6, and the proof uses the numbers that are listed.
     """
     weights, both = [rational(w) for w in discrete["weights"]], []
     for body in neumann_and_contact(discrete):
@@ -183,7 +183,7 @@ def kernel_is_hat(discrete: Json, radius: Json) -> bool:
 
 
 class TwoSteps(NamedTuple):
-    """What two steps differ by, as linear forms in (d, c): ``p`` and ``v`` by component, tangential ones first."""
+    """Differences of two steps, as linear forms in (d, c): ``p`` and ``v`` by component, tangential ones first."""
 
     S_n: arb_mat
     moved: arb_mat  # P' p as a matrix that is applied to c
@@ -196,7 +196,7 @@ class TwoSteps(NamedTuple):
 def two_steps(discrete: Json, k: fmpq, eliminated: Callable[..., arb_mat]) -> TwoSteps:
     """Let the forces on the Neumann body differ by ``g = S_n d``, so that its displacements differ by d.
 
-    Let those of the contact body then differ by -c.  Its reactions differ by ``p = S_c c``, the jumps by
+    Let the contact body's displacements differ by -c.  Its reactions differ by ``p = S_c c``, the jumps by
     ``v = -(P d + c)``, P being the transfer between both grids, and the friction bounds by at most ``w k |zeta|``,
     ``zeta = kernel g_N``.  Without friction ``p_T = 0``, and c has only normal components.
     """
@@ -226,7 +226,7 @@ def margin(steps: TwoSteps, theta: fmpq, factor: fmpq) -> arb_mat:
 def inequalities(steps: TwoSteps, leaf: Json) -> Iterator[tuple[fmpq, Form, Form]]:
     """Products whose sum is >= 0: ``lambda p_N v_N + tau p_T v_T + w k (a zeta^2 + b v_T^2)`` at each node.
 
-    Pressure is a monotone function of the jump: ``p_N v_N >= 0``.  So is friction, but for its bound: ``p_T v_T >= -w k
+    Pressure is a monotone function of the jump: ``p_N v_N >= 0``.  So is friction up to its bound: ``p_T v_T >= -w k
     |zeta| |v_T|``.  And ``tau |zeta| |v_T| <= a zeta^2 + b v_T^2``, as ``4 a b >= tau^2``.
     """
     t, n = len(steps.rubs), len(steps.v) - len(steps.rubs)
@@ -330,7 +330,7 @@ def words(document: Json) -> str:
 
 def examine(document: Json) -> None:
     """Raise one of UNREADABLE unless a certificate proves its claim."""
-    demand(document["sha256"] == digest(document["discrete"]), "the hash of its own bodies")
+    demand(document["sha256"] == digest(document["discrete"]), "the hash of its bodies")
     check(document["discrete"], document["claim"])
 
 
