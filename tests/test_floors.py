@@ -3,8 +3,11 @@
 ``python tests/test_floors.py`` writes the table into the page.
 """
 
+import ast
 import graphlib
+import io
 import sys
+import tokenize
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -103,7 +106,13 @@ FLOORS: dict[str, dict[str, str]] = {
     },
 }
 
-#: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
+#: Tokens that are no code.
+LAYOUT = {getattr(tokenize, name) for name in ["COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT", "ENCODING", "ENDMARKER"]}
+
+#: Lines and tokens of code of the three packages together at most; comments, docstrings and layout are no tokens.
+LINES, TOKENS = 53_800, 384_000
+
+#: Lines of each package at most, those of packages inside it apart: a tenth more than it has.
 BUDGET = {
     "fem1d2d": 4700,
     "ndtheory": 6900,
@@ -315,6 +324,24 @@ def test_no_line_of_the_list_is_idle(ours):
     inside = [edge for edge in ours if edge.kind == "function"]
     idle = [who for who in INSIDE if not any(within(e.module, who[0]) and within(e.name, who[1]) for e in inside)]
     assert idle == []
+
+
+def tokens(source: str) -> int:
+    """The number of tokens of a source without comments, docstrings and layout."""
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    written = [
+        node.body[0] for node in ast.walk(ast.parse(source)) if isinstance(node, kinds) and ast.get_docstring(node)
+    ]
+    said = {line for each in written for line in range(each.lineno, (each.end_lineno or each.lineno) + 1)}
+    found = tokenize.generate_tokens(io.StringIO(source).readline)
+    return sum(one.type not in LAYOUT and one.start[0] not in said for one in found)
+
+
+def test_the_packages_together_keep_to_one_limit():
+    texts = [path.read_text("utf-8") for path in FILES.values()]
+    assert sum(len(text.splitlines()) for text in texts) <= LINES
+    assert sum(map(tokens, texts)) <= TOKENS
+    assert tokens('"""Two."""\n# a comment\nx = (1 +\n     2)\n') == 7
 
 
 def test_no_package_is_longer_than_its_budget():

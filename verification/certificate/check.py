@@ -158,7 +158,7 @@ def neumann_and_contact(discrete: Json) -> list[Json]:
 def contact_positions(discrete: Json) -> tuple[list[arb], list[arb]]:
     """Positions of the contact nodes and the Neumann nodes, along x or along their lines: as the weights have it.
 
-    The weights must belong to the trapezoid rule for one of these, and a kernel with a radius must be its hat. 
+    The weights must belong to the trapezoid rule for one of these, and a kernel with a radius must be its hat.
     Positions may be rounded: both are compared up to 1e-6, and the proof uses the numbers that are listed.
     """
     weights, both = [rational(w) for w in discrete["weights"]], []
