@@ -287,8 +287,10 @@ def _rows(cls: type) -> Iterator[Row]:
         if one.spread:
             yield from _rows(inside) if inside else (Row(keys=(INCLUDED + kind,), says=one.says),)
             continue
-        if inside and kind.startswith("map of "):  # its members have a row
-            name, kind = f"{name}.*", kind.removeprefix("map of ")
+        if inside and kind.startswith("map of "):  # its members have a row, and it has one where it may be missing
+            if one.null is not None or one.absent is not None:
+                yield replace(one.row(name, "object"), says="")
+            name, kind, one = f"{name}.*", kind.removeprefix("map of "), replace(one, null=None, absent=None)
         yield one.row(name, kind)
         yield from (each.row(f"{name}.{below}", each.type) for below, each in one.inside.items())
         for row in _rows(inside) if inside else ():

@@ -23,7 +23,7 @@ class Registry(MutableMapping[str, V]):
     Examples
     --------
     >>> LAWS["local"].outside
-    'the law of friction is local'
+    'the local Coulomb law: S must map into L2(Gamma_c)'
     """
 
     def __init__(self, table: str) -> None:

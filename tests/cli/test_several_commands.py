@@ -80,9 +80,9 @@ def test_a_command_names_the_bodies_of_each_role(call, three, command, seen):
 
 
 def test_a_key_of_each_contact_is_not_suggested_as_one_that_can_be_set(call, three):
-    assert call("run", three, "--set", "friction=0.3").complaint.endswith(
-        "body1, body2, body3, contact, iteration, step, norm"
-    )
+    known = call("run", three, "--set", "friction=0.3").complaint.partition("known here: ")[2]
+    assert {*known.split(", ")} >= {"body1", "body2", "body3", "contact", "iteration"}
+    assert "friction" not in known
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def test_a_number_leads_to_its_code_its_tests_and_its_pages(entries):
     entries = {heading.split(":")[0]: text for heading, text in entries.items()}
     assert "`verification.contact.kkt.KKT`" in entries["(2.4)"]
     assert "`ndtheory.bounds.one_minus_h1`" in entries["(5.39)"]
-    assert re.search(r"`verification/test_ledger_discrete\.py::\w+`", entries["(5.13)"])
+    assert re.search(r"`verification/paper/test_ledger_discrete\.py::\w+`", entries["(5.13)"])
     assert "{doc}`/theory`" in entries["(5.30)"]
 
 

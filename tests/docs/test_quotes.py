@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 from processes import sites
 
+from ndtheory import statements as record
 from ndtheory.statements import statements
-from verification.ledger import quote, record
+from verification.ledger import quote
 from verification.ledger.sections import plain
+from verification.sections.bounds import on_the_printed_proof
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "examples").glob("*.md")), ROOT / "README.md"]
@@ -57,13 +59,13 @@ def test_no_page_types_a_verdict_of_the_ledger(page):
 
 
 def test_the_closing_note_of_the_screens_follows_the_record(monkeypatch):
-    note = record.on_the_printed_proof()
+    note = on_the_printed_proof()
     assert quote("5.30") in note
     assert quote("x-printed-rescued") in note
     assert quote("x-printed-rescued", "title") in note
     changed = record.recorded() | {"5.30": "NUMERICAL", "x-printed-rescued": "INCONCLUSIVE"}
     monkeypatch.setattr(record, "recorded", lambda: changed)
-    assert record.on_the_printed_proof() == note.replace("REPAIRED", "NUMERICAL").replace("PROVED", "INCONCLUSIVE")
+    assert on_the_printed_proof() == note.replace("REPAIRED", "NUMERICAL").replace("PROVED", "INCONCLUSIVE")
 
 
 def sentences(text):

@@ -385,4 +385,4 @@ def test_below_the_limit_of_friction_some_theta_is_proved_and_above_it_none(rho,
 def test_without_friction_nothing_limits_it():
     found = evaluate_energy(EnergyConstants(rho=2))
     assert found.friction_limit_multiple is None
-    assert found.reason["friction_limit_multiple"] == "no friction"
+    assert found.to_dict()["reason"]["friction_limit_multiple"] == "no friction"

@@ -69,11 +69,16 @@ def source(checks: Mapping[str, Callable[[Any], list[Evidence]]], shared: Callab
         ids: Collection[str] | None = None, level: Level = "quick", watch: Watch = lambda done: None
     ) -> dict[str, list[Evidence]]:
         chosen = [id for id in checks if ids is None or id in ids]
-        found = {}
+        found, shares = {}, [0.0]
+
+        def grow(share: float) -> None:
+            shares.append(max(shares[-1], share))
+            watch(shares[-1])
+
         with one_thread():
-            given = shared(level, watch) if chosen else None
+            given = shared(level, grow) if chosen else None
             for done, id in enumerate(chosen):
-                watch(done / len(chosen))
+                grow(done / len(chosen))
                 if entries := checks[id](given):
                     found[id] = entries
         watch(1.0)

@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import pytest
 from ledger_calls import EXACT, READ, STATEMENTS
 
+import verification as vf
 from ndtheory.statements import proof_of
 from verification import ledger
 from verification.semidefinite import losses
@@ -19,21 +20,6 @@ def unchecked(monkeypatch):
         raise AssertionError("a statement was checked")
 
     monkeypatch.setattr(ledger, "verify", refuse)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def losses_once():
-    """The losses of Section 6 are found once for all calls."""
-    found = []
-    locate = losses.locate
-
-    def again(pair, measured, **options):
-        found[:] = found or [locate(pair, measured, **options)]
-        return found[0]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(losses, "locate", again)
-        yield
 
 
 def shown(path):
@@ -70,7 +56,8 @@ def test_parts_of_an_id_are_drawn_together(call, unchecked, tmp_path):
 def test_the_legend_names_the_problem_its_unit_and_the_losses(call, unchecked, tmp_path):
     assert call("verify", "5.31", "--map", tmp_path / "map.svg").status == 0
     text = words(tmp_path / "map.svg")
-    found = losses.locate(None, None)
+    pair = vf.build(vf.example("section6"))
+    found = losses.locate(pair, vf.measure(pair))
     assert "Section 6" in text
     assert "in MPa" in text
     for loss in (*found.friction, *found.lipschitz):

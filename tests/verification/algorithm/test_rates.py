@@ -24,7 +24,7 @@ EPSILON = sys.float_info.epsilon
 #: A pair whose noise at a state is 4 eps |g|.
 SAME = lambda values: values
 PAIR = SimpleNamespace(
-    interface=SimpleNamespace(slipped=None, moduli=SimpleNamespace(carry=SAME, carry_back=SAME)),
+    interface=SimpleNamespace(slipped=np.zeros(0), moduli=SimpleNamespace(carry=SAME, carry_back=SAME)),
     neumann=SimpleNamespace(schur=np.zeros((1, 1)), inverse=np.eye(1), load=np.zeros(1)),
     contact=SimpleNamespace(schur=np.zeros((1, 1)), load=np.zeros(1)),
 )
