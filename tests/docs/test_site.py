@@ -114,9 +114,12 @@ LEFTOVER = re.compile(r"\{(?:[a-z]+:)?[a-z]+\}(?:`|&#96;|</span>\s*<span[^>]*>`)
 
 
 def roles_left_over(html_dir: Path) -> list[str]:
-    """Lines ``file: text`` for each role of the page's source that the reader of the built page would see."""
+    """Lines ``file: text`` for each role of the page's source that the reader of the built page would see.
+
+    Pages of source code show texts of keys as they are written, with their roles.
+    """
     found = []
-    for path in sorted(html_dir.rglob("*.html")):
+    for path in sorted({*html_dir.rglob("*.html")} - {*html_dir.glob("_modules/**/*.html")}):
         text = path.read_text(encoding="utf-8")
         text = re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL)
         found += [f"{path.relative_to(html_dir)}: {left.group()}" for left in LEFTOVER.finditer(text)]
