@@ -205,8 +205,8 @@ class Answer(Part):
         why="the constants have no enclosures, or some of those enclosed have no interval",
     )
     theta: float | None = key("the one asked about", null="without one", why="no theta given")
-    factor: Number | None = key(FACTOR, null="where there is no conclusion", why=_no_factor)
-    one_minus_factor: Number | None = key(FACTOR, null="where there is no conclusion", why=_no_factor)
+    factor: Number | None = key(FACTOR, null="without a conclusion", why=_no_factor)
+    one_minus_factor: Number | None = key(FACTOR, null="without a conclusion", why=_no_factor)
     verdict: Conclusion | None = key("`contraction` or `no conclusion`", null="without theta", why="no theta given")
 
     @staticmethod

@@ -24,7 +24,7 @@ TEXTS = ("title", "claims", "wrong", "repair", "proof", "note")
 
 
 #: What keys share that only a statement with a fault has.
-IF_FAULT: dict[str, Any] = {"default": "", "absent": "where there is no fault", "of": lambda text: text or ABSENT}
+IF_FAULT: dict[str, Any] = {"default": "", "absent": "without a fault", "of": lambda text: text or ABSENT}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ class Statement(Part):
     claims: str = key("in our own words")
     leans_on: tuple[str, ...] = key("ids that its proof uses", default=())
     fault: Fault | None = key(
-        "`false as printed`, `does not follow`, `gap` or `typo`", default=None, absent="where there is no fault"
+        "`false as printed`, `does not follow`, `gap` or `typo`", default=None, absent="without a fault"
     )
     wrong: str = key("what is wrong", **IF_FAULT)
     repair: str = key("its repaired form", **IF_FAULT)

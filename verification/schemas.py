@@ -51,7 +51,7 @@ def tables() -> dict[str, tuple[Row, ...]]:
 def header(cls: type[Document]) -> tuple[Row, ...]:
     """Return the rows with which the table of a document begins: it has a problem where its class declares one."""
     base, hint = keys.written(cls, "problem")
-    says, absent = "what the result is about", "where that is no problem file" if "None" in str(hint) else None
+    says, absent = "what the result is about", "where that is not a problem file" if "None" in str(hint) else None
     problem = (Row(keys=("problem",), type="Problem", says=says, absent=absent),) if base is not Document else ()
     kind = (Row(keys=("kind",), type="text", says=f"`{cls.kind}`"),) if cls.kind else ()
     return (included("Header"), *problem, *kind)

@@ -90,10 +90,3 @@ def freeze(value: T) -> T:
     elif hasattr(held, "indptr"):  # a sparse matrix
         freeze((held.data, held.indices, held.indptr))
     return value
-
-
-def to_plain(value: Any) -> Any:
-    """A value, or a tuple of values, as documents hold it: by its ``to_dict`` where it has one."""
-    if isinstance(value, tuple):
-        return [to_plain(member) for member in value]
-    return value.to_dict() if hasattr(value, "to_dict") else value

@@ -33,7 +33,7 @@ class Outcome(StrEnum):
     seen : str
         What was seen at the end.
     why : str
-        Why there is no number of steps to a solution, as a format that takes the ``steps``.
+        Reason why no number of steps to a solution follows, as a format that takes the ``steps``.
 
     Examples
     --------
@@ -88,7 +88,8 @@ class Ending:
     def at(self, residual: float, scale: float, arrived: Callable[[], bool] = lambda: True) -> Outcome | None:
         """Return the outcome if the iteration ends at a next state of these numbers, else None.
 
-        ``arrived`` is called where the residual meets the tolerance; the state is no solution where it returns False.
+        ``arrived`` is called where the residual meets the tolerance; a state for which it returns False does not solve
+        the problem.
         """
         self.steps += 1
         if self.steps == 0:

@@ -126,7 +126,7 @@ def _no_factor(result: BoundResult) -> str:
     return result.why or "no theta was given"
 
 
-_FACTOR = {"null": "where there is no conclusion", "why": _no_factor, "default": None}
+_FACTOR = {"null": "without a conclusion", "why": _no_factor, "default": None}
 
 
 @dataclass(frozen=True, kw_only=True)

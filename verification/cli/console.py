@@ -63,7 +63,8 @@ _stdout = _Stdout()
 
 
 def begin() -> None:
-    """Make the streams of this process safe to write to: closed ones lead nowhere, and keep their numbers from files.
+    """Make the streams of this process safe to write to: closed ones lead to the null device, and keep their numbers
+    from files.
 
     Characters beyond the encoding are written as escapes.
     """
@@ -81,7 +82,7 @@ def begin() -> None:
 
 
 def spend(stream: TextIO) -> OSError | None:
-    """Write out what a stream holds; where it cannot be written, it goes nowhere, and the error is returned.
+    """Write out what a stream holds; where it cannot be written, it is dropped, and the error is returned.
 
     Python would write it again when it ends, fail, and return another status.
     """

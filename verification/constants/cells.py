@@ -11,13 +11,13 @@ from typing import Any
 from fem1d2d.element import lacks
 from fem1d2d.layers import FacingLayers, Layer, peaks
 from ndtheory import Number
+from ndtheory.keys import plain
 from ndtheory.moduli import half_planes
 from verification.interface import assembly
 from verification.interface.body import material_of
 from verification.machine.threads import one_thread
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
-from verification.value import to_plain
 
 #: Columns of cells of a body in one period up to which the waves of both grids are joined: a tenth of a second.
 MOST_COLUMNS = 8
@@ -47,7 +47,7 @@ class OfCells:
 
     def objects(self) -> tuple[dict[str, Any], dict[str, str]]:
         """Both as a document has them, and the entries of its ``reason``."""
-        numbers = {name: to_plain(self.numbers.get(name)) for name in NAMES}
+        numbers = {name: plain(self.numbers.get(name)) for name in NAMES}
         return numbers, {} if self.numbers else dict.fromkeys(NAMES, self.why)
 
 

@@ -110,7 +110,7 @@ class Evidence(Part, ABC):
 
     @property
     def why_no_theta(self) -> str:
-        """Why there is no theta to paste; empty where there is one."""
+        """The reason why no theta can be pasted; empty where one can."""
         return ""
 
     @property

@@ -225,7 +225,7 @@ class Role(Part):
         return replace(cls.unknown(neumann_body, why), cells=cells, singular=singular)
 
 
-#: The fields of a role that are no values with a reason.
+#: The fields of a role that have no reason beside them.
 OTHERS = ("neumann_body", "reason", "singular", "energy", "spectrum", "cells", "level")
 
 

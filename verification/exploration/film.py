@@ -65,8 +65,8 @@ class FilmedRun(Part):
 
     theta: float = key()
     friction: float = key()
-    outcome: str = key("as in **Run**; or why there is no run, or why a history ended early")
-    iterations: int | None = key("of a history those of all increments", null="where there is no run", why=None)
+    outcome: str = key("as in **Run**; or the reason for a missing run, or why a history ended early")
+    iterations: int | None = key("of a history the sum over all increments", null="without a run", why=None)
     rate: float | None = key(
         "observed rate as in **Run**", null="where too few steps show it, and of a history", why=None
     )

@@ -9,6 +9,7 @@ a stress to 1 in the bracket of (5.30): there the right side depends on the unit
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from fractions import Fraction
@@ -45,7 +46,7 @@ THETAS = (0.1, 0.5, 0.9)
 SHARES = (Fraction(1, 100), Fraction(99, 100))
 
 
-class RightSides:
+class RightSides(ABC):
     """Right sides of Section 5 over numbers of any type, from the constants of a class that inherits."""
 
     m: Any
@@ -54,9 +55,9 @@ class RightSides:
     Q: Any
     energy: Any
 
+    @abstractmethod
     def grows(self, formula: Callable[..., Any]) -> Any:
         """A formula of C_K, m, M, C_R and u that falls with m and grows with the others (:mod:`ndtheory.bounds`)."""
-        raise NotImplementedError
 
     def of_energy(self, formula: Callable[..., Any]) -> Any:
         """A formula of rho, kappa_1 and kappa_2 that grows with each (:mod:`ndtheory.energy_norms`)."""

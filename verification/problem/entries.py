@@ -120,7 +120,7 @@ def entry(
 ) -> Any:
     """A field that is a key of the problem file: arguments as of :class:`Entry` and of :class:`ndtheory.keys.Key`.
 
-    Without ``initial`` a default that is no function is also the value where the key does not apply.
+    Without ``initial`` a default other than a function is also the value where the key does not apply.
     """
     initial = more.pop("initial", REQUIRED if default is EMPTY or callable(default) else default)
     own = {name: more.pop(name) for name in [*more] if name in Entry.__dataclass_fields__ and name != "name"}

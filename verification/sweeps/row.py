@@ -87,7 +87,7 @@ COLUMNS = {
         " the unit of force",
         null="where it was not before the run ended",
     ),
-    "steps": _whole(says="steps done; whatever the outcome", null="where there was no run"),
+    "steps": _whole(says="steps done; whatever the outcome", null="without a run"),
     "outcome": _text(
         says="how the run ended; as in **Run**; `refused` where the problem has no such run, `error` where a"
         " computation gave none"
