@@ -165,7 +165,7 @@ def _object(table: str) -> JsonSchema:
 
     def add(path: str, value: JsonSchema, *, required: bool) -> None:
         above, _, key = path.rpartition(".")
-        if above not in objects:  # it has no row: all that is said of it is that it has keys
+        if above not in objects:  # it has no row, only keys
             objects[above] = _empty()
             add(above, objects[above], required=True)
         if key == "*":

@@ -56,7 +56,7 @@ class BodyConstants(Part):
 _RHO_CELLS = says(
     r"$\rho^*$, $\rho_N^*$: `rho_max` and `rho_normal` of half-planes of the file's cells once halved, the largest "
     "over all waves along Gamma_c and the limit of long ones ({doc}`mesh_spectrum`)",
-    null="in 1D, for a pair made from matrices, bodies that are no rectangles or held along Gamma_c, and where the "
+    null="in 1D, for a pair made from matrices, bodies other than rectangles or held along Gamma_c, and where the "
     "lengths of cells have no ratio of numbers up to 4",
     why=lambda measured: measured.why_no_cells,
 )

@@ -43,7 +43,7 @@ class Evidence(Part):
     )
 
 
-#: The callable that is told the share that is done.
+#: A function that gets the share of the work that is done.
 Watch = Callable[[float], None]
 
 

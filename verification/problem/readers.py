@@ -1,4 +1,4 @@
-"""Readers of the keys of a problem file, beyond those of single values: vectors, what is said by name, positions."""
+"""Readers of the keys of a problem file, beyond those of single values: vectors, values by name, positions."""
 
 from __future__ import annotations
 

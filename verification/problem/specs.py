@@ -643,7 +643,7 @@ class ProblemSpec(Entries):
         numbers = self.numbers(body)
         return f"{'body' if len(numbers) == 1 else 'bodies'} {', '.join(map(str, numbers))}"
 
-    # --- contacts: one by one, and what is said of all together ---
+    # --- contacts: one by one, and what holds for all together ---
 
     @property
     def contact(self) -> ContactSpec:
