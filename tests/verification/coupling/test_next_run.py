@@ -44,8 +44,8 @@ def test_a_run_that_falls_below_two_levels_is_not_asked_for_again(tmp_path, step
 
 
 @pytest.mark.parametrize("tied", [False, True])
-@pytest.mark.parametrize("second", [0.85, 0.86, 0.8, 0.75, 0.7, 0.6])
-@pytest.mark.parametrize("first", [0.905, 0.9, 0.85, 0.8])
+@pytest.mark.parametrize("second", [0.85, 0.86, 0.75, 0.6])
+@pytest.mark.parametrize("first", [0.905, 0.9, 0.8])
 def test_after_runs_at_0_1_and_0_15_neither_is_asked_for(tmp_path, first, second, tied):
     found = advised(tmp_path, [("0.1", falling(first, 200)), ("0.15", falling(second, 120))], tied=tied)
     assert found.next.why.startswith("keep it") or found.next.theta not in (0.1, 0.15)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from problem_list import changed, plates
 from scipy.linalg import eigh
-from strategies import contact_problems, log_uniform
+from strategies import contact_problems, fewer, log_uniform
 
 import verification as vf
 from ndtheory.energy_norms import predicted_factor, predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
@@ -218,6 +218,7 @@ def test_a_tied_run_that_does_not_grow_beyond_doubt_leaves_the_run_to_make(ratio
     assert {reading.kind for reading in found.readings} <= {"mode-high", "mode-low"}
 
 
+@fewer(3)
 @given(contact_problems())
 def test_the_tied_theta_of_any_problem_lies_below_the_predicted_one_with_friction(data):
     try:

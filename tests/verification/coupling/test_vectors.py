@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from linear_couplings import Linear, strips
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification.coupling.spectrum import Spectrum
@@ -56,7 +57,7 @@ def test_units_a_shift_and_a_rotation_change_no_eigenvalue(values, seed, decades
 
 
 @pytest.mark.parametrize("rule", ["constant", "aitken", "anderson", "iqn-ils"])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(5 if AT_NIGHT else 2))
 def test_runs_by_any_method_show_the_ends(rule, seed):
     coupling = Linear(np.linspace(0.3, 6.0, 10), seed)
     seen = seen_in(*coupling.run(rule, 0.25, 10))
@@ -64,7 +65,7 @@ def test_runs_by_any_method_show_the_ends(rule, seed):
     assert seen.spectrum.low == pytest.approx(0.3, abs=0.25)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(40 if AT_NIGHT else 8))
 def test_theta_from_nine_iterates_of_aitken_never_diverges_and_is_near_the_best(seed):
     generator = np.random.default_rng(seed)
     low, high = 10 ** generator.uniform(-2, 0), 10 ** generator.uniform(0, 2.5)
@@ -155,7 +156,7 @@ def test_noise_of_the_solvers_is_measured_and_what_it_drowns_is_left_out():
 
 
 @pytest.mark.parametrize("written", [np.float32, lambda a: np.vectorize(lambda v: float(f"{v:.6e}"))(a)])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(6 if AT_NIGHT else 2))
 def test_vectors_of_few_digits_show_what_their_digits_hold(written, seed):
     coupling = Linear(np.linspace(2.5, 13.5, 12), seed)
     exact = coupling.run("aitken", 0.1, 9)
