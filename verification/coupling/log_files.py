@@ -89,7 +89,7 @@ def read_log(path: Path, pattern: str | None = None) -> Log:
     text = _ANSI.sub("", _text(path))
     if not text.strip():
         raise _refused(path, "needed residuals, this file is empty")
-    seconds = int(SECONDS + SECONDS_PER_CHARACTER * len(text))
+    seconds = SECONDS + int(SECONDS_PER_CHARACTER * len(text))
     form = form or form_of(text)
     try:
         with in_time(seconds) if pattern is not None else nullcontext():

@@ -289,20 +289,14 @@ def test_an_incompressible_body_is_held_by_no_multiple_of_a_compressible_one():
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"young": (1,)}, "young = 1: needed two numbers E1,E2"),
-        ({"young": (1, 2, 3)}, "young = 1,2,3: needed two numbers"),
         ({"young": "1,2"}, "young = 1,2: needed two numbers"),
         ({"young": 7}, "young = 7: needed two numbers"),
-        ({"young": (-1, 2)}, "young = -1: needed numbers E > 0"),
-        ({"young": (1, "soft")}, "young = soft: needed"),
         ({"young": (1, "1e30")}, r"young = 1\S*: needed numbers E > 0 \(1e-24 to 1e24\)"),
         ({"young": (1, float("nan"))}, "young = nan"),
-        ({"poisson": ("0.3", "0.6")}, "poisson = 0.6: needed numbers with -1 < nu <= 1/2"),
         ({"poisson": (-1, "0.3")}, "poisson = -1"),
         ({"plane": "shell"}, "plane = shell: needed one of strain, stress, 3d"),
         ({"corners": "3"}, "corners = 3: needed one of none, 1, 2, both"),
         ({"mirror": [3]}, r"mirror = \[3\]: needed bodies 1, 2 or both"),
-        ({"mirror": [2], "corners": "1"}, "that of body 2 goes on where body 1 ends in a corner"),
         ({"flat": True}, "flat = True: needed a mirror image"),
     ],
 )

@@ -1,5 +1,6 @@
 """The advice from logs on couplings of another code, whose spectrum is known."""
 
+import itertools
 import json
 import math
 from fractions import Fraction as F
@@ -14,7 +15,6 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification.coupling.ends import Box, cheapest, common, dearest, of_ratio
-from verification.problem.tables import ProblemError
 
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 
@@ -188,6 +188,9 @@ def test_the_recorded_table_keeps_what_its_page_says():
     """Nine of ten within 1.4 times the fewest steps, and no theta that is advised diverges."""
     record = json.loads((BENCHMARKS / "records" / "advice" / "couplings.json").read_text("utf-8"))
     assert record["first"][0]["theta"] == 0.5
+    for kind, body in itertools.product(("tied", "contact", "friction"), ("Neumann body 1", "Neumann body 2")):
+        both = [one for one in record["first"][0]["couplings"] if one["name"].startswith(kind)]
+        assert {one["noise"] for one in both if one["name"].endswith(body)} == {True, False}, (kind, body)
     for tried in record["first"]:
         rows = tried["couplings"]
         assert len(rows) == 50
@@ -217,20 +220,6 @@ def test_a_record_of_some_first_thetas_alone_never_takes_the_place_of_all(made, 
     found = [json.loads(path.read_text("utf-8")) for path in tmp_path.glob("advice/*.json")]
     assert [[row["theta"] for row in record["first"]] for record in found] == [[0.5, 0.1, 0.3, 0.9, 0.99]] * full
     assert ("no record" in capsys.readouterr().out) != full
-
-
-def test_bodies_of_the_record_are_of_both_dimensions_roles_and_kinds_with_noise_in_each():
-    record = json.loads((BENCHMARKS / "records" / "advice" / "couplings.json").read_text("utf-8"))
-    rows = record["first"][0]["couplings"]
-    for kind in ("tied", "contact", "friction"):
-        for body in ("Neumann body 1", "Neumann body 2"):
-            noise = {one["noise"] for one in rows if one["name"].startswith(kind) and one["name"].endswith(body)}
-            assert noise == {True, False}, (kind, body)
-
-
-def test_a_log_that_cannot_be_read_is_refused_with_tied_too(tmp_path):
-    with pytest.raises(ProblemError):
-        vf.advise_logs([(tmp_path / "none.log", "0.5")], tied=True)
 
 
 # --- Aitken, friction ------------------------------------------------------------------------------------------------

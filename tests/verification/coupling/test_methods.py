@@ -139,9 +139,7 @@ def table(own, exchanged=()):
         ((100, 30, 12), (6, 6, 6), True, "constant, exchanged", ""),
     ],
 )
-def test_the_simplest_method_that_costs_little_is_advised_and_contact_has_no_iqn_ils(
-    own, exchanged, tied, name, reason
-):
+def test_the_simplest_method_that_costs_little_is_advised(own, exchanged, tied, name, reason):
     found = advised(table(own, exchanged), tied=tied)
     assert found.name + ", exchanged" * found.exchanged == name
     assert reason in found.reason
