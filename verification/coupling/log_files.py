@@ -130,16 +130,9 @@ def _quasi_newton_beside(path: Path) -> str | None:
     beside = path.with_name(path.name.replace("-convergence.log", "-iterations.log"))
     if beside == path or unreadable(beside, MOST_BYTES):
         return None
-    names, *lines = (line.split() for line in _text(beside).split("\n"))
-    if "QNColumns" not in names:
-        return None
-    i = names.index("QNColumns")
-    counts = [int(words[i]) for words in lines if len(words) == len(names) and words[i].isdigit()]
-    return _quasi_newton(max(counts, default=0))
-
-
-def _quasi_newton(columns: int) -> str | None:
-    return f"quasi-Newton, up to {columns} columns" if columns else None
+    with suppress(ProblemError):  # a log of constant relaxation has these counts, too
+        return _LogTable(beside, _text(beside)).log().accelerator
+    return None
 
 
 def _number(word: str) -> float:
@@ -351,7 +344,7 @@ class _LogTable:
                     path=self.path,
                     form="preCICE",
                     columns=(),
-                    accelerator=_quasi_newton(int(modes.max())),
+                    accelerator=f"quasi-Newton, up to {int(modes.max())} columns",
                     counts=tuple(int(count) for count in counts),
                 )
         iteration, window, theta, residuals = self._roles(names, data.shape[1])
