@@ -361,16 +361,15 @@ class _LogTable:
                 raise _refused(self.path, f"needed a residual >= 0 in {names[i]}", self.numbers[wrong[0]], received)
             split = tuple(np.split(data[:, i], starts))
             columns.append(Column(name=names[i], residual=_kind(names[i]), windows=split, **_rounding(words[i])))
-        factors = None if theta is None else data[:, theta]
-        omega = theta is not None and factors is not None and "omega" in names[theta].lower()
-        changes = omega and factors is not None and bool((factors != factors[0]).any())
+        factors = np.empty(0) if theta is None else data[:, theta]
+        changes = theta is not None and "omega" in names[theta].lower() and bool((factors != factors[0]).any())
         return Log(
             path=self.path,
             form="preCICE" if any(_PRECICE.fullmatch(name) for name in names) else "columns",
             columns=tuple(columns),
-            theta=None if factors is None or changes else self._theta(factors),
+            theta=None if theta is None or changes else self._theta(factors),
             accelerator="Aitken" if changes else None,
-            factors=tuple(np.split(factors, starts)) if changes and factors is not None else (),
+            factors=tuple(np.split(factors, starts)) if changes else (),
             notes=tuple(self.notes),
         )
 

@@ -246,14 +246,14 @@ def of_solver(body: BodyNumber, S: Any, solve: Any, n: int) -> Side:
     seen, apply = side.seen, side.apply
     u, v = np.random.default_rng(1).standard_normal((2, n))
     if apply is not None:
-        skew = _tried(name, apply, u, v, "u'Su = {:.3g} for some u): needed a stiffness", 0.0)
+        _, skew = _tried(name, apply, u, v, "u'Su = {:.3g} for some u): needed a stiffness", 0.0)
         if seen.form == "operator":
             seen = replace(seen, asymmetry=_symmetric(name, skew))
     if inverse is not None and solve is not None:
-        least = float(np.finfo(float).tiny)  # above 0
-        skew = _tried(f"solve{body}", inverse, u, v, "f'u = {:.3g} for some f): needed the inverse of S", least)
+        needed = "f'u = {:.3g} for some f): needed the inverse of S"
+        Fu, skew = _tried(f"solve{body}", inverse, u, v, needed, math.ulp(0.0))
         _symmetric(f"solve{body}", skew)
-        off = 0.0 if apply is None else float(np.linalg.norm(apply(inverse(u)) - u) / np.linalg.norm(u))
+        off = 0.0 if apply is None else float(np.linalg.norm(apply(Fu) - u) / np.linalg.norm(u))
         if not off <= INVERSE:
             raise ValueError(
                 f"solve{body} is not the inverse of {name}: their product changes a vector by {off:.2g} of it"
@@ -280,13 +280,13 @@ def _of_sparse(name: str, S: sp.csc_array, inverse: Apply | None) -> tuple[Side,
     return Side(seen=seen, apply=symmetric.__matmul__), inverse
 
 
-def _tried(name: str, function: Apply, u: Floats, v: Floats, refusal: str, least: float) -> float:
-    """The asymmetry of a product or a solve by two vectors, over their energies, which are ``least`` at least."""
+def _tried(name: str, function: Apply, u: Floats, v: Floats, refusal: str, least: float) -> tuple[Floats, float]:
+    """What a function makes of u, and its asymmetry by u and v over their energies, which are ``least`` at least."""
     Au, Av = function(u), function(v)
     energies = float(u @ Au), float(v @ Av)
     if not min(energies) >= least:
         raise ValueError(f"{name} is not positive ({refusal.format(min(energies))}")
-    return abs(float(u @ Av - v @ Au)) / (math.sqrt(energies[0] * energies[1]) or 1.0)
+    return Au, abs(float(u @ Av - v @ Au)) / (math.sqrt(energies[0] * energies[1]) or 1.0)
 
 
 def _symmetric(name: str, skew: float) -> float:

@@ -306,7 +306,6 @@ def test_a_document_of_a_run_says_what_is_unknown_and_why():
     [
         ("0.45", "0.8", ["mode-high"]),
         ("0.1", "1.4", ["mode-high", "level"]),
-        ("0.3", "1", ["mode-high", "level"]),
         ("0.3", "0.97", ["mode-high", "level"]),
         ("0.1", "0.5", ["mode-high", "mode-low"]),
         ("0.6", "0.4", ["mode-high", "mode-low", "open"]),

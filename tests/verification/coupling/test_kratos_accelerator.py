@@ -5,13 +5,14 @@ import json
 import sys
 from types import ModuleType, SimpleNamespace
 
+import coupling_logs
 import numpy as np
 import pytest
 
 from verification.coupling.driver import Coupling
 from verification.coupling.kratos import LABEL, Accelerator, Create
 
-MODES = np.array([0.2, 0.5, 1.1, 3.0])
+MODES = np.array(coupling_logs.MODES)
 
 
 def time_step(accelerator, steps, solution=1.0):

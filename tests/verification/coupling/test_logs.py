@@ -259,10 +259,8 @@ def test_following_the_logs_pastes_a_theta_that_converges_in_few_steps(tmp_path,
 @pytest.mark.parametrize("moduli", [(2e4, 7e4, 1), (7e4, 2e4, 2), (7e4, 2e4, 1)], ids=str)
 def test_following_the_logs_of_two_bodies_in_contact_ends_in_a_theta_that_converges(tmp_path, moduli, friction):
     E1, E2, neumann_body = moduli
-    data = changed(
-        body1={"young": E1}, body2={"young": E2},
-        contact={"friction": friction}, iteration={"neumann_body": neumann_body},
-    )  # fmt: skip
+    moduli = {"body1": {"young": E1}, "body2": {"young": E2}}
+    data = changed(**moduli, contact={"friction": friction}, iteration={"neumann_body": neumann_body})
     pair = pair_from(vf.Problem.from_dict(data))
     noises = (0, 0.01) if friction == "0" else (0.01, 0)
     runs = list(itertools.product((0.9, 0.3), noises))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from coupling_logs import linear_run, precice
+from coupling_logs import MODES, linear_run, precice
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -167,12 +167,11 @@ def transient(modes, theta, windows, steps, seed=0):
 
 @pytest.mark.parametrize("theta", [0.1, 0.2, 0.3, 0.45])
 def test_short_windows_are_pooled_into_a_pace_that_names_the_next_run_and_bounds_nothing(tmp_path, theta):
-    modes = (0.2, 0.5, 1.1, 3.0)
-    found = advised(tmp_path, [(repr(theta), transient(modes, theta, 40, 8))])
+    found = advised(tmp_path, [(repr(theta), transient(MODES, theta, 40, 8))])
     (column,) = found.logs[0].columns
     assert column.count("short") == 40
     assert column.ratio is None
-    q = max(abs(1 - theta * (1 + mode)) for mode in modes)
+    q = max(abs(1 - theta * (1 + mode)) for mode in MODES)
     assert 0.85 * q <= float(column.pooled.value) <= q * 1.001
     assert column.pooled.least <= column.pooled.value <= column.pooled.most
     assert "pooled" in column.says
