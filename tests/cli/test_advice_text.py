@@ -155,7 +155,7 @@ def test_a_theta_next_to_1_is_not_pasted_and_the_screen_says_what_auto_takes(cal
     assert capped == ("\n  theta = 0.99\n" in out) == (young == 7)
 
 
-@fewer(3)
+@fewer(5)
 @drawn(contact_problems())
 def test_auto_and_the_advice_agree_on_random_problems_or_the_screen_says_why_not(data):
     try:

@@ -215,7 +215,7 @@ def test_without_friction_rho_is_at_least_what_a_ratio_above_1_minus_theta_says(
 
 #: Plates, frictions and starts in turn; at night each with each.
 EVERY = list(product(PLATES, ["0", "0.2", "1"], [0.9, 0.3]))
-FOLLOWED = EVERY if AT_NIGHT else EVERY[::3]
+FOLLOWED = EVERY if AT_NIGHT else EVERY[::5]
 
 
 @pytest.mark.parametrize(("name", "friction", "start"), FOLLOWED)

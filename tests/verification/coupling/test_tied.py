@@ -195,7 +195,7 @@ def test_a_tied_run_that_does_not_grow_beyond_doubt_leaves_the_run_to_make(ratio
     assert {reading.kind for reading in found.readings} <= {"mode-high", "mode-low"}
 
 
-@fewer(3)
+@fewer(5)
 @given(contact_problems())
 def test_the_tied_theta_of_any_problem_lies_below_the_predicted_one_with_friction(data):
     try:
