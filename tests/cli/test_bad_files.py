@@ -127,6 +127,19 @@ def test_a_matrix_whose_header_is_damaged_is_refused(call, tmp_path):
     )
 
 
+#: A column outside, a negative one, a row that ends outside, a last row that does.
+OUTSIDE = [([0, 10**6], [0, 1, 2]), ([0, -(10**6)], [0, 1, 2]), ([0, 1], [0, 10**6, 2]), ([0, 1], [0, 2, 10**6])]
+
+
+@pytest.mark.parametrize(("indices", "indptr"), OUTSIDE)
+def test_a_sparse_matrix_that_points_outside_itself_is_refused_and_not_followed(call, tmp_path, indices, indptr):
+    """A process that followed would end by a signal."""
+    good, bad = tmp_path / "good.npz", tmp_path / "bad.npz"
+    np.savez(good, np.eye(2))
+    np.savez(bad, format="csr", shape=(2, 2), data=np.ones(2), indices=np.array(indices), indptr=np.array(indptr))
+    assert "bad.npz" in call("advise", "matrices", "--S1", good, "--S2", bad).complaint
+
+
 @pytest.mark.parametrize("kind", ["csr", "csc", "coo", "dia", "bsr"])
 def test_a_sparse_matrix_of_every_kind_is_read(tmp_path, kind):
     full = np.diag([2.0, 3.0, 4.0, 5.0]) + np.eye(4, k=1) + np.eye(4, k=-1)
