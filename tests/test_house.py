@@ -87,9 +87,9 @@ def test_what_only_reads_is_let_through(source):
 
 # --- imports, in a process: another test may have imported the same in this one ---
 
-#: Without hypothesis, which says how often it was asked for, every name at the top is fetched.  Then each module of ours
-#: is imported.  At every import on the way, and at the end, what lies in sys.modules under a name that could be imported
-#: must be what would be imported: another thread may ask for it at that moment.
+#: Without hypothesis, which says how often it was asked for, every name at the top is fetched.  Then each module of
+#: ours is imported.  At every import on the way, and at the end, what lies in sys.modules under a name that could be
+#: imported must be what would be imported: another thread may ask for it at that moment.
 IMPORTS = """
 import importlib, pkgutil, sys
 from importlib.machinery import PathFinder

@@ -85,9 +85,9 @@ def test_bad_input_wins_over_everything(call, write, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "error", [RuntimeError("made up"), ValueError("made up"), AssertionError(), ZeroDivisionError()]
+    ("command", "error"),
+    [("run", RuntimeError("made up")), ("compare", ValueError("made up")), ("constants", ZeroDivisionError())],
 )
-@pytest.mark.parametrize("command", ["run", "compare", "constants"])
 def test_a_crash_says_that_it_is_one_and_is_no_status_of_the_interface(call, write, monkeypatch, command, error):
     def fail(problem, law=None):
         raise error
@@ -149,8 +149,7 @@ def endless(write):
     return write({"iteration.theta": "1e-4", "iteration.max_iterations": "100000"})
 
 
-@pytest.mark.parametrize("states", [1, 2, 40])
-@pytest.mark.parametrize("command", ["run", "compare"])
+@pytest.mark.parametrize(("command", "states"), [("run", 1), ("compare", 2), ("compare", 40)])
 def test_ctrl_c_keeps_what_was_computed_and_says_so(call, quick, endless, after, tmp_path, command, states):
     after(states, lambda: signal.raise_signal(signal.SIGINT))
     answer = call(command, endless, "-o", tmp_path / "results", "--json")
@@ -252,8 +251,7 @@ def test_a_stalled_run_ends_early_and_the_theta_it_advises_converges(call, bars)
         assert call("run", bars, *advice).status == DONE
 
 
-@pytest.mark.parametrize("edits", ["wrong roles", "stiff upper body"])
-@pytest.mark.parametrize("command", ["run", "compare"])
+@pytest.mark.parametrize(("command", "edits"), [("run", "wrong roles"), ("compare", "stiff upper body")])
 def test_what_a_run_advises_is_accepted(call, write, command, edits):
     file = write(edits)
     answer = call(command, file)

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mesh_writer import write_gmsh22
 from problem_list import bars, small
+from strategies import fewer
 
 import verification as vf
 from fem1d2d import rectangle
@@ -71,6 +72,7 @@ def test_a_float_of_a_dictionary_means_its_shortest_decimal(given_value, value):
     assert plane("contact.friction", given_value).contact.friction == value
 
 
+@fewer(3)
 @given(strategies.contact_problems())
 def test_every_number_of_a_dictionary_is_kept(data):
     problem = vf.Problem.from_dict(data)
@@ -141,6 +143,7 @@ def test_a_free_component_is_none():
 # --- problems made from problems ---
 
 
+@fewer(3)
 @given(strategies.contact_problems(), strategies.thetas())
 def test_another_theta_changes_theta_alone(data, theta):
     problem = vf.Problem.from_dict(data)
@@ -156,6 +159,7 @@ def test_a_theta_outside_the_interval_is_refused(theta):
     assert error.value.key == "theta"
 
 
+@fewer(3)
 @given(strategies.contact_problems())
 def test_swapping_twice_is_no_change(data):
     problem = vf.Problem.from_dict(data)
@@ -163,6 +167,7 @@ def test_swapping_twice_is_no_change(data):
     assert problem.swapped().swapped() == problem
 
 
+@fewer(3)
 @given(strategies.contact_problems(), st.integers(0, 4))
 def test_halving_doubles_the_cells_each_time(data, halvings):
     problem = vf.Problem.from_dict(data)

@@ -11,6 +11,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import fewer
 
 import verification as vf
 from verification.interface.friction import Local
@@ -75,6 +76,7 @@ def test_both_bodies_are_changed_by_one_pair():
     assert BARS.changed(cells=(3, 5)).body2.cells == (5,)
 
 
+@fewer(3)
 @given(strategies.contact_problems())
 def test_no_change_is_no_change(data):
     problem = vf.Problem.from_dict(data, source="my.toml")
@@ -83,6 +85,7 @@ def test_no_change_is_no_change(data):
     assert same.source == "my.toml"
 
 
+@fewer(3)
 @given(strategies.plane_problems(), st.fractions(0, 10**9))
 def test_friction_is_changed_exactly(data, k):
     problem = vf.Problem.from_dict(data)
@@ -91,6 +94,7 @@ def test_friction_is_changed_exactly(data, k):
     assert problem.changed(friction=k) == put(problem, "contact.friction", k)
 
 
+@fewer(3)
 @given(strategies.contact_problems(), strategies.thetas())
 def test_changes_of_different_keys_commute(data, theta):
     problem = vf.Problem.from_dict(data)
