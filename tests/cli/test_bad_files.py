@@ -144,21 +144,12 @@ def test_a_sparse_matrix_of_every_kind_is_read(tmp_path, kind):
 # --- mesh files ---
 
 
-def mesh_file(
-    path,
-    x=(0.0, 2.0),
-    y=(-0.3, 0.0),
-    cells=(10, 2),
-    names=("left", "right", "bottom", "top"),
-    lift=None,
-    twice=False,
-    surfaces=(),
-):
+def mesh_file(path, y=(-0.3, 0.0), names=("left", "right", "bottom", "top"), lift=None, twice=False, surfaces=()):
     """The built-in rectangle as a Gmsh file.
 
     ``lift`` moves its upper side, ``twice`` doubles its cells, ``surfaces`` names equal parts of them.
     """
-    mesh = rectangle(x, y, cells)
+    mesh = rectangle((0.0, 2.0), y, (10, 2))
     listed = np.tile(mesh.cells, (2 if twice else 1, 1))
     points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
     if lift is not None:

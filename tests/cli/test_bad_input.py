@@ -33,69 +33,44 @@ NO_NUMBERS = [
 #: What no single key may hold: key, value, what is needed.
 VALUES = [
     ("body1.young", "0", "a number > 0"),
-    ("body1.young", "-1", "a number > 0"),
     ("body1.poisson", "0.5", "a number with -1 < nu < 0.5"),
     ("body2.poisson", "-1", "a number with -1 < nu < 0.5"),
-    ("body2.poisson", '"1/2"', "a number with -1 < nu < 0.5"),
     ("contact.friction", "-1e-300", "a number >= 0"),
-    ("contact.radius", "0", "a number > 0"),
     ("contact.radius", "-0.1", "a number > 0"),
     ("contact.gap", "-1", "a number >= 0"),
     ("contact.law", '"coulomb"', 'one of "nonlocal", "local"'),
-    ("contact.law", "1", 'one of "nonlocal", "local"'),
-    ("iteration.theta", "0", "a number with 0 < theta < 1"),
     ("iteration.theta", "1", "a number with 0 < theta < 1"),
-    ("iteration.theta", "-0.5", "a number with 0 < theta < 1"),
-    ("iteration.theta", "1.5", "a number with 0 < theta < 1"),
-    ("iteration.tolerance", "0", "a number with 0 < tolerance < 1"),
-    ("iteration.tolerance", "-1e-9", "a number with 0 < tolerance < 1"),
     ("iteration.tolerance", "1", "a number with 0 < tolerance < 1"),
     ("iteration.max_iterations", "0", "a whole number >= 1"),
-    ("iteration.max_iterations", "-3", "a whole number >= 1"),
     ("iteration.max_iterations", "12.5", "a whole number >= 1"),
     ("iteration.max_iterations", "true", "a whole number >= 1"),
-    ("iteration.max_iterations", '"9"', "a whole number >= 1"),
     ("iteration.neumann_body", "3", "one of 1, 2"),
     ("iteration.neumann_body", "true", "one of 1, 2"),
-    ("iteration.neumann_body", '"1"', "one of 1, 2"),
     ("iteration.relaxation", '"faster"', '"constant"'),
     ("dimension", "3", "one of 1, 2"),
     ("dimension", "2.0", "one of 1, 2"),
-    ("dimension", "true", "one of 1, 2"),
     ("title", "1", "a text in quotes"),
-    ("title", '["a"]', "a text in quotes"),
     ("units.length", "1", "a text in quotes"),
     ("body1.shape", '"circle"', '"rectangle"'),
     ("body1.shape", '"interval"', '"rectangle"'),
     ("body1.cells", "[0, 2]", "whole number"),
-    ("body1.cells", "[10, -2]", "whole number"),
-    ("body1.cells", "[12.5, 2]", "whole number"),
-    ("body1.cells", "[10.0, 2]", "whole number"),
     ("body1.cells", "[true, 2]", "whole number"),
     ("body1.cells", "[10]", "two whole numbers"),
-    ("body1.cells", "[10, 2, 2]", "two whole numbers"),
     ("body1.cells", "10", "two whole numbers"),
     ("body1.cells", "[1000000, 1000000]", "at most"),
     ("body1.x", "[2.0, 0.0]", "a < b"),
-    ("body1.x", "[1.0, 1.0]", "a < b"),
     ("body1.x", "[0.0, 1.0, 2.0]", "a < b"),
-    ("body1.x", "[0.0, true]", "a < b"),
     ("contact.interval", "[1.6, 0.4]", "a < b"),
     ("body1.fixed", '["bottum"]', "left, right, bottom, top"),
-    ("body1.fixed", '["Bottom"]', "left, right, bottom, top"),
     ("body1.fixed", '["bottom", "bottom"]', "once"),
     ("body1.fixed", '"bottom"', "a list of side names"),
-    ("body1.fixed", "[1]", "a list of side names"),
     ("body2.prescribed", '["top"]', "a table"),
     ("body2.prescribed", "{ middle = [0, 0] }", "left, right, bottom, top"),
     ("body2.prescribed", "{ top = -0.015 }", "two numbers, along x and y"),
-    ("body2.prescribed", "{ top = [0.0, -0.015, 0.0] }", "two numbers, along x and y"),
     ("body2.prescribed", '{ top = ["fixed", -0.015] }', '"free"'),
     ("body1.prescribed", "{ bottom = [0.0, 0.0] }", "fixed already"),
-    ("body1.traction", "{ middle = [0.0, 1.0] }", "left, right, bottom, top"),
     ("body1.traction", "{ bottom = [0.0, 1.0] }", "held"),
     ("body1.traction", '{ left = ["free", 1.0] }', "two numbers, along x and y"),
-    ("body1.body_force", "1.0", "two numbers, along x and y"),
 ]
 
 BESIDE_SHAPE = ["x", "y", "cells", "young", "poisson", "fixed", "body_force"]
@@ -150,9 +125,7 @@ TOGETHER = {
     "drawn into each other": ({"body2.y": "[-0.1, 0.3]"}, ["body2.y", "lie in each other", "y = -0.1", "5 %", "0.3"]),
     "the upper body first": ({"body1.y": "[0.3, 0.6]"}, ["body2.y", "lie in each other", "y = 0.6", "y = 0"]),
     "apart along x": ({"body2.x": "[3.0, 4.2]"}, ["body2.x", "do not meet", "0 to 2", "3 to 4.2"]),
-    "corner to corner": ({"body2.x": "[2.0, 3.2]"}, ["body2.x", "do not meet"]),
     "an interval outside the overlap": ({"contact.interval": "[0.2, 1.6]"}, ["contact.interval", "[0.4, 1.6]"]),
-    "an interval far from the overlap": ({"contact.interval": "[5.0, 6.0]"}, ["contact.interval", "[0.4, 1.6]"]),
     "an interval that ends between nodes": (
         {"contact.interval": "[0.5, 1.5]"},
         ["contact.interval", "begin and end at nodes", "0.4, 0.6, 1.4, 1.6"],
@@ -187,11 +160,8 @@ BARS = {
 #: What is no problem file at all: bytes, then fragments.
 CONTENTS = {
     "an empty file": (b"", ["empty", "ndtheory example"]),
-    "a blank file": (b" \n\t\n", ["empty", "ndtheory example"]),
     "comments alone": (b"# nothing\n", ["body1", "missing"]),
     "malformed TOML": (b"[body1\nx = 1", ["not TOML", "line 1"]),
-    "an unclosed string": (b'title = "a\n', ["not TOML", "line 1"]),
-    "a key set twice": (b"title = 'a'\ntitle = 'b'\n", ["not TOML", "line 2"]),
     "a table opened twice": (b"[norm]\nlength = 1\n[norm]\n", ["not TOML", "norm", "line 3"]),
     "binary rubbish": (bytes(range(256)) * 8, ["UTF-8"]),
     "half a letter of UTF-16": ("title = 'a'".encode("utf-16")[:-1], ["UTF-8"]),
@@ -200,7 +170,6 @@ CONTENTS = {
     "brackets without end": (b"a = " + b"[" * 100_000, ["not TOML"]),
     "a number of 9999 digits": (b"a = " + b"9" * 9999, ["line 1", "too many digits", "up to 1e+30"]),
     "an exponent of 20 digits": (b"a = 1\nb = 1e" + b"9" * 20, ["line 2", "too many digits"]),
-    "JSON": (b'{"title": "a"}', ["not TOML", "line 1"]),
 }
 
 
@@ -261,13 +230,8 @@ def test_bars_are_refused_what_only_plane_bodies_have(call, write, edits, fragme
 @pytest.mark.parametrize(
     ("key", "guess"),
     [
-        ("titel", "title"),
-        ("body1.yuong", "young"),
         ("body2.presribed", "prescribed"),
-        ("contact.fricton", "friction"),
-        ("iteration.max_iteration", "max_iterations"),
         ("iteration.Theta", "theta"),
-        ("norm.lenght", "length"),
         ("units.time", "stress"),
         ("mesh.cells", "norm"),
         ("contact.mu", "friction"),
@@ -278,7 +242,7 @@ def test_an_unknown_key_or_table_is_refused_with_the_known_ones(call, write, key
     assert_names(line, "problem.toml", key.removesuffix(".cells"), "unknown", guess)
 
 
-@pytest.mark.parametrize("key", ["body1.shape", "body1.x", "body1.young", "body1.poisson", "body2.y", "body2.cells"])
+@pytest.mark.parametrize("key", ["body1.young", "body2.cells"])
 def test_a_missing_key_is_named(call, write, key):
     assert_names(call("run", write({key: None})).complaint, "problem.toml", key, "missing")
 

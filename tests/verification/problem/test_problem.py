@@ -106,20 +106,10 @@ def test_what_is_left_out_takes_its_default():
     assert problem.body1.body_force == (0, 0)
     assert dict(problem.body1.prescribed) == dict(problem.body1.traction) == {}
     contact, iteration = problem.contact, problem.iteration
-    assert (contact.interval, contact.friction, contact.law, contact.radius, contact.gap) == (
-        None,
-        0,
-        "nonlocal",
-        None,
-        0,
-    )
+    found = (contact.interval, contact.friction, contact.law, contact.radius, contact.gap)
+    assert found == (None, 0, "nonlocal", None, 0)
     assert (iteration.neumann_body, iteration.theta, iteration.max_iterations) == (2, F(1, 2), 500)
     assert iteration.tolerance == 1e-9
-
-
-def numbers(result):
-    """The document of a result without the problem, which tells how it was given."""
-    return {key: value for key, value in result.to_dict().items() if key != "problem"}
 
 
 def test_contact_reaches_as_far_as_the_bodies_overlap():
@@ -214,22 +204,12 @@ def test_lists_and_tuples_are_read_alike(sequence):
 @pytest.mark.parametrize(
     ("key", "value", "needed"),
     [
-        ("body1.young", -1, "> 0"),
-        ("body1.young", True, "> 0"),
         ("body1.young", math.nan, "> 0"),
-        ("body2.poisson", 0.5, "-1 < nu < 0.5"),
-        ("contact.friction", -0.1, ">= 0"),
-        ("contact.radius", 0, "> 0"),
         ("contact.law", "Local", "nonlocal"),
         ("iteration.theta", 1, "0 < theta < 1"),
-        ("iteration.tolerance", 0, "0 < tolerance < 1"),
-        ("iteration.max_iterations", 12.5, "whole number"),
         ("body1.cells", [10, 0], "whole number"),
         ("body1.x", [2, 0], "a < b"),
-        ("body1.fixed", ["under"], "left, right, bottom, top"),
-        ("body1.shape", "circle", "rectangle"),
         ("title", 3, "text"),
-        ("dimension", 3, "1, 2"),
         ("norm", [], "table"),
     ],
     ids=str,
@@ -248,16 +228,13 @@ def test_an_error_carries_file_key_value_and_what_is_needed(key, value, needed):
     assert message.isprintable()
 
 
-@pytest.mark.parametrize(
-    ("key", "file_key"),
-    [("young", "body1.young"), ("x", "body1.x"), ("poisson", "body1.poisson"), ("shape", "body1.shape")],
-)
-def test_a_missing_key_has_no_value(key, file_key):
+@pytest.mark.parametrize("key", ["x", "poisson", "shape"])
+def test_a_missing_key_has_no_value(key):
     data = copy.deepcopy(PLANE)
     del data["body1"][key]
     with pytest.raises(vf.ProblemError) as caught:
         vf.Problem.from_dict(data)
-    assert (caught.value.file, caught.value.key, caught.value.value) == ("<dict>", file_key, None)
+    assert (caught.value.file, caught.value.key, caught.value.value) == ("<dict>", f"body1.{key}", None)
     assert "missing" in caught.value.needed
 
 
@@ -265,11 +242,8 @@ def test_a_missing_key_has_no_value(key, file_key):
     ("key", "meant"),
     [
         ("titel", "title"),
-        ("body1.yuong", "young"),
         ("body1.poison", "poisson"),
-        ("body2.prescibed", "prescribed"),
         ("contact.fricton", "friction"),
-        ("iteration.max_iteration", "max_iterations"),
         ("norm.lenght", "length"),
         ("iteratoin", "iteration"),
     ],
@@ -293,17 +267,7 @@ def test_what_is_no_dictionary_is_refused(data):
         vf.Problem.from_dict(data)
 
 
-@pytest.mark.parametrize(
-    ("content", "needed"),
-    [
-        (None, "no such file"),
-        (b"", "empty"),
-        (b"\xff\xfe", "empty"),
-        (b"a = ", "TOML"),
-        (b"\xff\xfea", "UTF-8"),
-        (b"\xff", "UTF-8"),
-    ],
-)
+@pytest.mark.parametrize(("content", "needed"), [(None, "no such file"), (b"\xff\xfe", "empty"), (b"\xff", "UTF-8")])
 def test_what_is_no_problem_file_is_refused_with_its_name(tmp_path, content, needed):
     path = tmp_path / "my.toml"
     if content is not None:
@@ -313,14 +277,13 @@ def test_what_is_no_problem_file_is_refused_with_its_name(tmp_path, content, nee
     assert (caught.value.file, caught.value.key, caught.value.value) == (str(path), "", None)
 
 
-@pytest.mark.parametrize("function", [vf.measure, vf.run, vf.compare, lambda problem: next(vf.iterate(problem))])
 @pytest.mark.parametrize(
-    ("key", "value", "named"),
+    ("function", "key", "value", "named"),
     [
-        ("body1.fixed", [], "body1"),
-        ("body1.fixed", ["bottom", "top"], "body1.fixed"),
-        ("body2.x", [3, 4], "body2.x"),
-        ("contact.interval", [0, 1], "contact.interval"),
+        (vf.measure, "body1.fixed", [], "body1"),
+        (vf.run, "body1.fixed", ["bottom", "top"], "body1.fixed"),
+        (vf.compare, "body2.x", [3, 4], "body2.x"),
+        (lambda problem: next(vf.iterate(problem)), "contact.interval", [0, 1], "contact.interval"),
     ],
 )
 def test_a_problem_that_cannot_be_built_is_refused_by_every_function(function, key, value, named):
