@@ -5,11 +5,11 @@ import os
 import re
 import zipfile
 
-import meshio
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from complaints import assert_names
+from mesh_writer import read_here, write_gmsh22
 
 from fem1d2d import rectangle
 from verification.coupling.matrix_files import read_matrix
@@ -150,26 +150,18 @@ def mesh_file(path, y=(-0.3, 0.0), names=("left", "right", "bottom", "top"), lif
     ``lift`` moves its upper side, ``twice`` doubles its cells, ``surfaces`` names equal parts of them.
     """
     mesh = rectangle((0.0, 2.0), y, (10, 2))
-    listed = np.tile(mesh.cells, (2 if twice else 1, 1))
-    points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
+    points = mesh.points.copy()
     if lift is not None:
         upper = points[:, 1] == y[1]
         points[upper, 1] += lift(points[upper, 0])
-    sides = ("left", "right", "bottom", "top")
-    tags = np.concatenate([np.full(len(mesh.sides[side]), i) for i, side in enumerate(sides, 1)])
-    inside = 9 + np.arange(len(listed)) * len(surfaces) // len(listed)
-    named = {name: np.array([i, 1]) for i, name in enumerate(names, 1)}
-    meshio.write(
-        path,
-        meshio.Mesh(
-            points,
-            [("line", np.concatenate([mesh.sides[side] for side in sides])), ("triangle", listed)],
-            cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
-            field_data=named | {name: np.array([i, 2]) for i, name in enumerate(surfaces, 9)},
-        ),
-        file_format="gmsh22",
-        binary=False,
-    )
+    sides = dict(zip(names, (mesh.sides[side] for side in ("left", "right", "bottom", "top")), strict=True))
+    write_gmsh22(path, points, np.tile(mesh.cells, (2 if twice else 1, 1)), sides, surfaces)
+
+
+@pytest.fixture
+def read_at_once(monkeypatch):
+    """Files of meshes are read in this process: those of these tests need no limits."""
+    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)
 
 
 MESHED = {"body1.mesh": '"body1.msh"'} | dict.fromkeys(f"body1.{key}" for key in ("shape", "x", "y", "cells"))
@@ -222,6 +214,7 @@ def test_a_hostile_mesh_file_is_refused_within_its_limits(call, write, tmp_path,
     assert_names(line, "problem.toml", "body1.mesh", name, *fragments)
 
 
+@pytest.mark.usefixtures("read_at_once")
 def test_a_body_of_two_materials_is_refused_with_their_names(call, write, tmp_path):
     mesh_file(tmp_path / "body1.msh", surfaces=("rubber", "steel"))
     line = call("run", write(MESHED)).complaint
@@ -230,6 +223,7 @@ def test_a_body_of_two_materials_is_refused_with_their_names(call, write, tmp_pa
     assert call("run", write(MESHED)).status == 0
 
 
+@pytest.mark.usefixtures("read_at_once")
 @pytest.mark.parametrize(
     ("changes", "fragments"),
     [
@@ -244,6 +238,7 @@ def test_a_mesh_that_does_not_fit_is_refused_by_name(call, write, tmp_path, chan
     assert_names(call("run", write(MESHED)).complaint, "problem.toml", *fragments)
 
 
+@pytest.mark.usefixtures("read_at_once")
 def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measured(call, write, tmp_path, monkeypatch):
     mesh_file(tmp_path / "body1.msh")
     monkeypatch.setattr("verification.constants.measuring.largest_sparse", None)
@@ -251,6 +246,7 @@ def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measur
     assert_names(line, "problem.toml", "body1.mesh", "body1.msh", "halved")
 
 
+@pytest.mark.usefixtures("read_at_once")
 @pytest.mark.parametrize(
     ("command", "fault", "says"),
     [
@@ -273,6 +269,7 @@ def test_a_malformed_mesh_is_refused_by_its_fault(call, write, tmp_path, command
     assert "matching" not in line
 
 
+@pytest.mark.usefixtures("read_at_once")
 def test_a_mesh_with_every_cell_twice_is_refused_as_that(call, write, tmp_path):
     """Not for its grid on Gamma_c: no edge would be left on the boundary."""
     mesh_file(tmp_path / "body1.msh", twice=True)

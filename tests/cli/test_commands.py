@@ -41,20 +41,17 @@ HEADINGS = {
 
 #: Edits whose screens hold what others do not: reasons, rates next to 1, other rules.
 TOLD = [
-    *[None, "apart", "unloaded", "without friction", "held tangentially", "local law", "wrong roles"],
-    *["soft upper body", "stiff upper body", {"iteration.theta": '"auto"', "contact.friction": "3"}],
-    *({"iteration.relaxation": f'"{relaxation}"'} for relaxation in ("aitken", "anderson", "newton", "momentum")),
+    *["without friction", "held tangentially", "local law", "soft upper body"],
+    *[{"iteration.theta": '"auto"', "contact.friction": "3"}, {"iteration.relaxation": '"newton"'}],
+    {"iteration.relaxation": '"momentum"'},
 ]
 
 
 @pytest.fixture
-def built_in(tmp_path):
-    def write(name):
-        path = tmp_path / f"{name}.toml"
-        path.write_text(examples()[name], encoding="utf-8")
-        return path
-
-    return write
+def built_in(write, tmp_path, monkeypatch):
+    """``built_in(name)``: a built-in problem in the current folder, its file."""
+    monkeypatch.chdir(tmp_path)
+    return lambda name: write(name=f"{name}.toml", text=examples()[name]).name
 
 
 # --- help ---
@@ -113,10 +110,8 @@ def test_every_built_in_problem_has_its_expected_status():
         *[("run", "inside"), ("run", "two-bars"), ("solve", "signorini"), ("constants", "section6-190")],
     ],
 )
-def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monkeypatch, tmp_path, command, name):
-    monkeypatch.chdir(tmp_path)
-    built_in(name)
-    answer = call(command, f"{name}.toml")
+def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, command, name):
+    answer = call(command, built_in(name))
     assert answer.status == dict(zip(("run", "compare"), BUILT_IN[name], strict=True)).get(command, 0)
     lines = answer.out.splitlines()
     assert lines[0].startswith(tomllib.loads(examples()[name])["title"])
@@ -127,10 +122,8 @@ def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monke
 
 
 @pytest.mark.parametrize("name", ["section6-190", "signorini", "two-bars"])
-def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, monkeypatch, tmp_path, name):
-    monkeypatch.chdir(tmp_path)
-    built_in(name)
-    answer = call("advise", f"{name}.toml")
+def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, name):
+    answer = call("advise", built_in(name))
     lines = answer.out.splitlines()
     assert (answer.status, answer.err) == (0, "")
     asked = [head for head in HEADINGS["advise"] if "FRICTION" not in head or name not in ("signorini", "two-bars")]
@@ -144,9 +137,8 @@ def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, monkeypatc
     ("command", "edits"),
     [
         *(("compare", edits) for edits in TOLD),
-        *(("run", edits) for edits in ("wrong roles", "stiff upper body", *TOLD[9:11], TOLD[-1])),
-        *((command, edits) for command in ("constants", "advise") for edits in ("local law", "soft upper body")),
-        *[("solve", "apart"), ("solve", "without friction")],
+        *(("run", edits) for edits in ("wrong roles", "stiff upper body", *TOLD[-3:])),
+        *[("constants", "soft upper body"), ("advise", "local law"), ("advise", "soft upper body"), ("solve", "apart")],
     ],
     ids=str,
 )

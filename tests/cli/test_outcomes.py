@@ -48,6 +48,7 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
     ended = "not converged" if outcome == "limit" else outcome
     line = rf"^  observed +{ended} after " if command == "compare" else rf"^  observed .* {ended}$"
     assert re.search(line, screen.out, flags=re.M)
+    assert [line for line in screen.out.splitlines() if len(line) > 80 and str(file) not in line] == []
     assert answer.err == screen.err
 
 
@@ -226,13 +227,6 @@ def test_a_disk_that_fills_up_is_told_in_one_line_and_costs_no_result(
 # --- advice ---
 
 
-@pytest.fixture
-def bars(tmp_path):
-    file = tmp_path / "two-bars.toml"
-    file.write_text(examples()["two-bars"], encoding="utf-8")
-    return file
-
-
 def advised(line: str) -> list[list[str]]:
     """Options that a sentence proposes: a theta for these roles, one for the other roles."""
     swapped = re.search(r"--swap-roles with --theta ([\d.e-]+)", line)
@@ -240,7 +234,8 @@ def advised(line: str) -> list[list[str]]:
     return ([["--theta", own[1]]] if own else []) + ([["--swap-roles", "--theta", swapped[1]]] if swapped else [])
 
 
-def test_a_stalled_run_ends_early_and_the_theta_it_advises_converges(call, bars):
+def test_a_stalled_run_ends_early_and_the_theta_it_advises_converges(call, write):
+    bars = write(text=examples()["two-bars"])
     answer = call("run", bars, "--theta", "0.6", "--json")
     assert (answer.status, answer.document["outcome"]) == (NOT_MET, "stalled")
     assert answer.document["evaluations"] < 100
@@ -348,9 +343,8 @@ def test_a_rule_that_takes_its_own_step_is_replaced_next(call, write):
     assert call(*following).status == NOT_MET
 
 
-def test_a_remedy_is_no_division_by_zero_where_one_grid_is_coarser(call, tmp_path):
-    file = tmp_path / "190.toml"
-    file.write_text(examples()["section6-190"], encoding="utf-8")
+def test_a_remedy_is_no_division_by_zero_where_one_grid_is_coarser(call, write):
+    file = write(text=examples()["section6-190"])
     answer = call("run", file, "--swap-roles", "--theta", "0.6")
     assert answer.status == NOT_MET
     better = re.search(r"try --theta (0\.\d+) .*, or without --swap-roles with --theta (0\.\d+)$", answer.err)

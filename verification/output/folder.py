@@ -122,7 +122,7 @@ class Folder:
 
 
 def writer(path: Path | None, kind: Kind) -> Callable[[Any], None] | None:
-    """What writes a result of a kind into a folder, which is checked at once; None where none was named."""
+    """Return the function that writes a result into a folder, which is checked at once; None where none was named."""
     return None if path is None else Folder(path, kind).write
 
 
