@@ -52,6 +52,14 @@ def shared(tmp_path_factory):
     return Shared(folder)
 
 
+@pytest.fixture(scope="session")
+def ours(shared):
+    """Every import of the packages."""
+    from import_graph import ours
+
+    return shared("imports", ours)
+
+
 @pytest.fixture
 def decided_once(monkeypatch, shared):
     """Each form of a check is decided once in the session."""
