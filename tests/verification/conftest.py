@@ -13,12 +13,12 @@ from verification.sweeps import workers
 collect_ignore = [] if find_spec("KratosMultiphysics") else ["kratos_contact.py"]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def comparison():
     return vf.compare(problem())
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def written(comparison, tmp_path_factory):
     """A folder with everything in it."""
     folder = tmp_path_factory.mktemp("written")
