@@ -80,18 +80,24 @@ def test_the_certificates_of_these_tests_have_cases_of_every_kind(divided):
 
 
 #: A built-in problem and its theta, or the seed of a random one: those that take most sets among the first 44.
-CLOSE_TO = [("section6-60", "0.7"), 23, 27, 24, 10, 38, 5, 16, ("section6", "0.4"), ("section6", "0.7")]
+CLOSE_TO = [("section6-60", "0.7"), 27, 23, 24, 10, 38, 5, 16, ("section6", "0.4"), ("section6", "0.7")]
 
 
-@pytest.mark.parametrize("problem", CLOSE_TO if AT_NIGHT else CLOSE_TO[:3], ids=str)
+@pytest.mark.parametrize("problem", CLOSE_TO if AT_NIGHT else CLOSE_TO[:2], ids=str)
 def test_the_proved_factor_is_within_1_2_per_cent_of_the_attained_one(problem):
     if isinstance(problem, tuple):
-        found = vf.certify(vf.example(problem[0]), theta=problem[1], exact=True)
+        data, theta = vf.example(problem[0]), problem[1]
     else:
         generator = np.random.default_rng(problem)
-        drawn = random_problem(generator, matching=bool(problem % 3))
-        theta = relaxation_factor(generator, vf.measure(drawn).rho_max.value)
-        found = vf.certify(drawn, theta=str(theta), exact=True)
+        data = random_problem(generator, matching=bool(problem % 3))
+        theta = str(relaxation_factor(generator, vf.measure(data).rho_max.value))
+    found = vf.certify(data, theta=theta, exact=True)
+    if problem == 27:  # one set of all pieces does not do it
+        with pytest.raises(
+            NoCertificate, match=r"bound of the factor is 1\.22\d, the largest factor found 0\.592.*exact"
+        ):
+            vf.certify(data, theta=theta)
+        assert found.factor < Fraction(6, 10)
     assert found.lower * (1 - 1e-12) <= float(found.factor) <= 1.012 * found.lower
     assert check_again(json.loads(found.to_json())).accepted
 
@@ -277,15 +283,6 @@ def test_a_tree_that_is_none_is_refused_with_what_is_needed(edit, said, divided)
     found = check_again(document)
     assert not found.accepted
     assert said in found.why
-
-
-def test_dividing_the_pieces_proves_contraction_where_one_set_does_not():
-    generator = np.random.default_rng(27)
-    drawn = random_problem(generator, matching=False)
-    theta = str(relaxation_factor(generator, vf.measure(drawn).rho_max.value))
-    with pytest.raises(NoCertificate, match=r"bound of the factor is 1\.22\d, the largest factor found 0\.592.*exact"):
-        vf.certify(drawn, theta=theta)
-    assert vf.certify(drawn, theta=theta, exact=True).factor < Fraction(6, 10)
 
 
 def test_only_the_semidefinite_bound_divides():
