@@ -120,45 +120,9 @@ def tampered(claim, draw, largest):
     return claim
 
 
-def another_case(inner, leaf, other, draw):
-    inner["cases"][draw.randrange(len(inner["cases"]))] = other
-
-
-def the_same_case_twice(inner, leaf, other, draw):
-    inner["cases"] = [copy.deepcopy(draw.choice(inner["cases"]))] * 2
-
-
-def one_case_left_out(inner, leaf, other, draw):
-    inner["cases"].pop(draw.randrange(len(inner["cases"])))
-
-
-def a_third_case(inner, leaf, other, draw):
-    inner["cases"].append(other)
-
-
-def cases_exchanged(inner, leaf, other, draw):
-    inner["cases"].reverse()
-
-
-def divided_otherwise(inner, leaf, other, draw):
-    inner["divided"] = draw.choice(["signs", "normal", "slip", "Normal", None, ""])
-
-
-def at_another_node(inner, leaf, other, draw):
-    inner["node"] = draw.choice([0, 1, 2, -1, True, 1.0, "0", None, [0]])
-
-
-def not_divided(inner, leaf, other, draw):
-    inner.clear()
-    inner.update(other)
-
-
-def divided_once_more(inner, leaf, other, draw):
-    own = copy.deepcopy(leaf)
-    leaf.clear()
-    leaf.update(
-        {"divided": draw.choice(["signs", "normal", "slip"]), "node": draw.randint(0, 2), "cases": [own, other]}
-    )
+def become(tree, other):
+    tree.clear()
+    tree.update(other)
 
 
 def other_multipliers(inner, leaf, other, draw):
@@ -183,17 +147,21 @@ def equations_added_or_left_out(inner, leaf, other, draw):
         values.append(draw.choice(["0", "1", "-1000", "100000000", 1, None]))
 
 
+KINDS = ["signs", "normal", "slip"]
+
+#: Changes of a division, of any subtree, by another one that may take its place.
 CHANGES = [
-    another_case,
-    another_case,
-    the_same_case_twice,
-    one_case_left_out,
-    a_third_case,
-    cases_exchanged,
-    divided_otherwise,
-    at_another_node,
-    not_divided,
-    divided_once_more,
+    *[lambda inner, leaf, other, draw: inner["cases"].__setitem__(draw.randrange(len(inner["cases"])), other)] * 2,
+    lambda inner, leaf, other, draw: inner.update(cases=[copy.deepcopy(draw.choice(inner["cases"]))] * 2),
+    lambda inner, leaf, other, draw: inner["cases"].pop(draw.randrange(len(inner["cases"]))),
+    lambda inner, leaf, other, draw: inner["cases"].append(other),
+    lambda inner, leaf, other, draw: inner["cases"].reverse(),
+    lambda inner, leaf, other, draw: inner.update(divided=draw.choice([*KINDS, "Normal", None, ""])),
+    lambda inner, leaf, other, draw: inner.update(node=draw.choice([0, 1, 2, -1, True, 1.0, "0", None, [0]])),
+    lambda inner, leaf, other, draw: become(inner, other),
+    lambda inner, leaf, other, draw: become(
+        leaf, {"divided": draw.choice(KINDS), "node": draw.randint(0, 2), "cases": [copy.deepcopy(leaf), other]}
+    ),
     other_multipliers,
     one_multiplier,
     equations_added_or_left_out,

@@ -17,7 +17,7 @@ from strategies import AT_NIGHT, fewer
 
 from fem1d2d import bar, element, interval, plane_strain, rectangle
 from fem1d2d.proofs import exact
-from fem1d2d.proofs.enclosed import Enclosed, gamma
+from fem1d2d.proofs.enclosed import Enclosed
 from fem1d2d.proofs.exact import Shapes, fractions
 from fem1d2d.proofs.loewner import Elimination, positive_definite
 from fem1d2d.proofs.proved import enclose_largest, inverse, root
@@ -142,27 +142,6 @@ def test_a_form_lies_between_its_ends_for_dense_and_sparse_matrices(rows, x):
         assert F(low) < truth < F(high)
 
 
-@given(st.lists(sizes, min_size=8, max_size=8))
-def test_products_and_sums_of_enclosed_matrices_hold_those_of_the_exact_ones(entries):
-    a, b = np.array(entries[:4], dtype=object).reshape(2, 2), np.array(entries[4:], dtype=object).reshape(2, 2)
-    A, B = Enclosed.rounded(a), Enclosed.rounded(b)
-    for found, truth in ((A.times(B), a @ b), (A.plus(-0.3, B, factor=1.7), F(1.7) * a - F(0.3) * b)):
-        assert (abs(truth - fractions(found.middle)) <= fractions(found.radius)).all()
-
-
-def test_the_bound_of_n_roundings_is_rounded_upwards():
-    for n in (1, 2, 3, 10, 1000, 10**6):
-        exactly = F(n, 2**53) / (1 - F(n, 2**53))
-        assert exactly < F(gamma(n)) < exactly * (1 + F(1, 10**14))
-
-
-def test_matrices_of_doubles_are_no_exact_ones():
-    with pytest.raises(TypeError, match="needed rationals"):
-        Enclosed.rounded(np.array([[0.5]]))
-    with pytest.raises(ValueError, match="ordinary size"):
-        Enclosed.rounded(np.array([[F(1, 10**200)]], dtype=object))
-
-
 # --- what is proved is proved where it can be ------------------------------------------------------------------------
 
 
@@ -183,12 +162,6 @@ def test_the_schur_complement_of_a_chain_of_springs_lies_between_close_bounds(n,
     low, high = eliminated.bound(1)[0, 0], eliminated.bound(-1)[0, 0]
     assert F(low) < F(1, n + 1) < F(high)
     assert high - low < 1e-14 * n**2
-
-
-def test_a_matrix_that_is_not_finite_proves_nothing():
-    with np.errstate(invalid="ignore"):
-        assert not positive_definite(Enclosed.exactly(np.array([[np.nan]])))
-        assert not positive_definite(Enclosed.exactly(np.array([[np.inf]])))
 
 
 def test_a_pencil_without_a_definite_second_matrix_has_no_bounds():
