@@ -26,6 +26,14 @@ def written(comparison, tmp_path_factory):
     return folder
 
 
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch):
+    """No process for each mesh file."""
+    from mesh_writer import read_here
+
+    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)
+
+
 @pytest.fixture
 def place(tmp_path):
     """Where a sweep keeps its rows."""
