@@ -52,6 +52,14 @@ def shared(tmp_path_factory):
     return Shared(folder)
 
 
+@pytest.fixture(scope="session")
+def ours(shared):
+    """Every import of the packages."""
+    from import_graph import ours
+
+    return shared("imports", ours)
+
+
 @pytest.fixture
 def decided_once(monkeypatch, shared):
     """Each form of a check is decided once in the session."""
@@ -79,12 +87,13 @@ def evidence(shared):
 
 @pytest.fixture
 def known_continuum(monkeypatch, shared):
-    """The constants of the continuum are computed once for the same two rectangles."""
+    """Calibrations of one body, and constants of two, are computed once."""
     from verification.certificate import continuum
 
-    compute = continuum.bounded
-    known = lambda model: shared(("continuum", model), lambda: compute(model))
-    monkeypatch.setattr(continuum, "bounded", known)
+    for name in ("for_traces", "for_cut_off", "bounded"):
+        compute = getattr(continuum, name)
+        known = lambda *given, name=name, compute=compute: shared((name, *given), lambda: compute(*given))
+        monkeypatch.setattr(continuum, name, known)
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,20 @@ from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.relaxation import Constant
 
 Series = Sequence[float]
+
+#: Eigenvalues of a tied interface, rho = 3.
+MODES = (0.2, 0.5, 1.1, 3.0)
+
+
+def kinds(found: Any) -> list[str]:
+    """The kinds of the readings of an advice or a log."""
+    return [reading.kind for reading in found.readings]
+
+
+def written(path: Path, text: str | bytes, encoding: str = "utf-8") -> Path:
+    """A file with this text."""
+    path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
+    return path
 
 
 def linear_run(modes: Series, theta: float, steps: int) -> tuple[list[float], list[float]]:

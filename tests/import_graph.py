@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 PACKAGES = ("fem1d2d", "ndtheory", "verification")
+
+ROOT = Path(__file__).parents[1]
+
+
+def module_name(path: Path) -> str:
+    """The module in a file below the root."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+#: Every module of the packages, with its file.
+FILES = {module_name(path): path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))}
 
 COMPUTED = "a name computed at run time"
 
@@ -54,6 +68,7 @@ def written_name(call: ast.Call) -> str:
 def imports(module: str, text: str, is_package: bool = False) -> Iterator[Import]:
     """All that a source imports, wherever it is indented."""
     waiting: list[tuple[ast.AST, Kind]] = [(ast.parse(text), "module")]
+    nodes = ast.AST if re.search("import_module|__import__", text) else (ast.stmt, ast.ExceptHandler, ast.match_case)
     while waiting:
         node, kind = waiting.pop()
         if isinstance(node, ast.Import):
@@ -69,7 +84,8 @@ def imports(module: str, text: str, is_package: bool = False) -> Iterator[Import
             kind = "function"
         elif kind == "module" and isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
             kind = "types"
-        waiting.extend((child, kind) for child in reversed(list(ast.iter_child_nodes(node))))
+        children = [child for child in ast.iter_child_nodes(node) if isinstance(child, nodes)]
+        waiting.extend((child, kind) for child in reversed(children))
 
 
 def edges(sources: Mapping[str, str], packages: frozenset[str] = frozenset()) -> list[Import]:
@@ -90,3 +106,9 @@ def edges(sources: Mapping[str, str], packages: frozenset[str] = frozenset()) ->
             if target != module:
                 found.append(Import(module, each.line, target, each.kind))
     return found
+
+
+def ours() -> list[Import]:
+    """Every import of the packages."""
+    texts = {module: path.read_text("utf-8") for module, path in FILES.items()}
+    return edges(texts, frozenset(module for module, path in FILES.items() if path.name == "__init__.py"))

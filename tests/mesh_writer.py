@@ -10,17 +10,22 @@ import pytest
 from fem1d2d import Mesh, MeshError, from_file, mesh_reader, rectangle
 
 
-def write_gmsh22(path: Path, points: np.ndarray, cells: np.ndarray, sides: Mapping[str, np.ndarray]) -> None:
-    """Triangles in the plane, their sides as physical names 1, 2, ..; the inside has the tag 9."""
+def write_gmsh22(
+    path: Path, points: np.ndarray, cells: np.ndarray, sides: Mapping[str, np.ndarray], surfaces: Sequence[str] = ()
+) -> None:
+    """Triangles in the plane, their sides as physical names 1, 2, ..; the inside has the tag 9, or a name for each of
+    some equal parts.
+    """
     tags = np.concatenate([np.full(len(facets), i) for i, facets in enumerate(sides.values(), 1)])
-    inside = np.full(len(cells), 9)
+    inside = 9 + np.arange(len(cells)) * len(surfaces) // len(cells)
     meshio.write(
         path,
         meshio.Mesh(
             np.pad(points, ((0, 0), (0, 1))),
             [("line", np.concatenate(list(sides.values()))), ("triangle", cells)],
             cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
-            field_data={name: np.array([i, 1]) for i, name in enumerate(sides, 1)},
+            field_data={name: np.array([i, 1]) for i, name in enumerate(sides, 1)}
+            | {name: np.array([i, 2]) for i, name in enumerate(surfaces, 9)},
         ),
         file_format="gmsh22",
         binary=False,

@@ -26,7 +26,7 @@ UNDRAWN = """
 
     drawn = lambda *args: None
     figures = dict.fromkeys(("draw_bodies", "draw_residuals", "draw_waterfall"), drawn)
-    save = lambda figure, path: path.write_bytes(b"<svg/>")
+    save = lambda figure, path: path.write_bytes(b"<svg><dc:title>ndtheory</dc:title></svg> Software\\0ndtheory")
     sys.modules["verification.figures"] = SimpleNamespace(save=save, **figures)
     sys.exit(main())
 """

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from import_graph import COMPUTED, PACKAGES, Import, edges, imports, within
+from import_graph import COMPUTED, FILES, Import, edges, imports, within
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "architecture.md"
@@ -160,15 +160,6 @@ DOORS = {
 THEORY = {"sympy": ("ndtheory.symbolic",)}
 
 
-def module_name(path: Path) -> str:
-    """The module in a file below the root."""
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-FILES = {module_name(path): path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))}
-
-
 def through_the_wall(found: list[Import]) -> Iterator[str]:
     """The imports of a library by a module that has no door to it, and those that name none."""
     for module, line, name, _ in found:
@@ -245,13 +236,6 @@ def with_table(page: str) -> str:
     before, _, rest = page.partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}\n{table()}\n{END}{after}"
-
-
-@pytest.fixture(scope="module")
-def ours() -> list[Import]:
-    """The imports of the house."""
-    texts = {module: path.read_text("utf-8") for module, path in FILES.items()}
-    return edges(texts, frozenset(module for module, path in FILES.items() if path.name == "__init__.py"))
 
 
 def test_every_module_stands_on_exactly_one_floor():

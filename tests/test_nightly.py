@@ -93,9 +93,11 @@ def test_an_unknown_part_is_one_line(capsys):
     assert capsys.readouterr().err.startswith("nonsense: no part; needed some of theory, ")
 
 
-def test_tests_are_run_in_the_nightly_profile(tmp_path):
-    (tmp_path / "test_profile.py").write_text(
-        "import os\ndef test(): assert os.environ['HYPOTHESIS_PROFILE'] == 'nightly'"
+@pytest.mark.parametrize(("profile", "passes"), [("nightly", True), ("dev", False)])
+def test_tests_are_run_in_the_nightly_profile(tmp_path, monkeypatch, profile, passes):
+    code = (
+        f"import os, sys; sys.exit([os.environ['HYPOTHESIS_PROFILE'], *sys.argv[1:]] != ['{profile}', 'test_one.py'])"
     )
-    assert nightly.tested(tmp_path, ["-n", "0", "test_profile.py"])
-    assert not nightly.tested(tmp_path, ["-n", "0", "test_nothing.py"])
+    assert nightly.COMMAND[:2] == ("-m", "pytest")
+    monkeypatch.setitem(nightly.tested.__globals__, "COMMAND", ("-c", code))
+    assert nightly.tested(tmp_path, ["test_one.py"]) is passes

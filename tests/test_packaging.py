@@ -1,6 +1,5 @@
 """Which Pythons are promised, tried and run: the same in the classifiers, the workflow, the Makefile and the README."""
 
-import ast
 import os
 import re
 import subprocess
@@ -13,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from import_graph import PACKAGES, Import, within
 from processes import ended, environment
 from strategies import AT_NIGHT
 
@@ -22,7 +22,6 @@ from verification.extras import EXTRAS
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 DISTRIBUTIONS = packages_distributions()
-PACKAGES = ("fem1d2d", "ndtheory", "verification")
 PROMISED = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
 
 
@@ -87,21 +86,17 @@ def test_a_lock_holds_what_its_extras_need_in_the_versions_of_the_whole_lock(loc
 HOSTS = {"KratosMultiphysics"}
 
 
-def needs(path: Path) -> set[str]:
-    """The distributions whose modules a file imports, wherever the statement stands."""
-    tree = ast.parse(path.read_text("utf-8"))
-    found = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
-    found |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
-    tops = {name.partition(".")[0] for name in found} - {"mpl_toolkits", *HOSTS, *PACKAGES, *sys.stdlib_module_names}
-    return {DISTRIBUTIONS[name][0].lower() for name in tops}
+def missing(found: Iterable[Import]) -> set[str]:
+    """The distributions whose modules are imported and which are no dependencies."""
+    tops = {each.name.partition(".")[0] for each in found if each.kind != "name"}
+    tops -= {"mpl_toolkits", *HOSTS, *PACKAGES, *sys.stdlib_module_names}
+    return {DISTRIBUTIONS[name][0].lower() for name in tops} - named(PROJECT["dependencies"])
 
 
-def test_a_plain_installation_has_all_that_the_packages_import_but_for_extras_and_the_test_kit():
-    kit = ROOT / "verification" / "testing"
-    paths = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py") if kit not in path.parents]
-    missing = set().union(*map(needs, paths)) - named(PROJECT["dependencies"])
-    assert missing == {"distributed", "xarray"}
-    assert set().union(*map(needs, kit.rglob("*.py"))) - named(PROJECT["dependencies"]) == {"hypothesis"}
+def test_a_plain_installation_has_all_that_the_packages_import_but_for_extras_and_the_test_kit(ours):
+    kit = [each for each in ours if within(each.module, "verification.testing")]
+    assert missing(each for each in ours if each not in kit) == {"distributed", "xarray"}
+    assert missing(kit) == {"hypothesis"}
 
 
 def test_each_option_with_an_extra_names_one_that_installs_what_it_needs_and_readme_has_it():
@@ -175,9 +170,12 @@ def overwritten(tmp_path):
     return found
 
 
-@pytest.mark.parametrize("content", ["", '__version__ = "0.0.9"\n'], ids=["empty", "another version"])
-@pytest.mark.parametrize(("code", "status"), [(WARNED, 0), (COMMAND, 2)], ids=["Python", "command"])
-def test_a_foreign_package_named_verification_is_told_in_one_line(overwritten, code, status, content):
+@pytest.mark.parametrize(
+    ("content", "code", "status"),
+    [("", COMMAND, 2), ('__version__ = "0.0.9"\n', WARNED, 0)],
+    ids=["empty", "another version"],
+)
+def test_a_foreign_package_named_verification_is_told_in_one_line(overwritten, content, code, status):
     found = overwritten(code, content)
     assert (found.returncode, found.stdout) == (status, "")
     [line] = found.stderr.splitlines()

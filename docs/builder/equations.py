@@ -115,9 +115,11 @@ def pages() -> list[tuple[str, str]]:
 def places(statement: Statement, texts: list[tuple[str, str]]) -> list[str]:
     """The names of the texts that name a statement, each once."""
     anywhere, in_tables = written(statement, quoted=False), written(statement)
-    return list(
-        dict.fromkeys(name for name, text in texts if (in_tables if TABLES.search(name) else anywhere).search(text))
+    number = re.search(r"\d\.\d+|$", statement.id)[0] or statement.id  # in all that names it
+    named = (
+        name for name, text in texts if number in text and (in_tables if TABLES.search(name) else anywhere).search(text)
     )
+    return list(dict.fromkeys(named))
 
 
 def anchor(statement: Statement) -> str:

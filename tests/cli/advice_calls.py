@@ -1,8 +1,13 @@
 """What the tests of `advise` share: the keys of a role, matrices in files, and the theta to paste."""
 
 import re
+import tomllib
+from functools import cache
 
 import numpy as np
+from problem_list import SMALL, edited
+
+import verification as vf
 
 ROLE = {
     "neumann_body",
@@ -22,6 +27,25 @@ def saved(folder, name: str, matrix, how=np.savez):
     path = folder / f"{name}.npz"
     how(path, matrix)
     return path
+
+
+def given(folder, S1, S2, how=np.savez):
+    """The words of `advise matrices` for two matrices in files a.npz and b.npz."""
+    return ("advise", "matrices", "--S1", saved(folder, "a", S1, how), "--S2", saved(folder, "b", S2, how))
+
+
+@cache
+def wrong_roles():
+    """The advice for the small problem with its roles exchanged, and the matrices of bodies 1 and 2."""
+    problem = vf.Problem.from_dict(tomllib.loads(edited(SMALL, {"iteration.neumann_body": "2"})))
+    pair = vf.build(problem)
+    return vf.advise(problem).to_dict(), (pair.contact.schur, pair.neumann.schur)
+
+
+def fits(lines):
+    """A screen of 80 columns and 46 lines; the last line may name a file."""
+    assert max(map(len, lines[:-1])) <= 80
+    assert len(lines) <= 46
 
 
 def by_body(document):

@@ -14,9 +14,7 @@ from verification.cli.problems import examples
 # --- advise, from a problem ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "edits", [None, "without friction", "wrong roles", "local law", "soft upper body", "stiff upper body"], ids=str
-)
+@pytest.mark.parametrize("edits", [None, "without friction", "wrong roles", "local law", "stiff upper body"], ids=str)
 def test_advice_follows_rho_of_both_roles_and_names_the_smaller_rate(call, write, edits):
     file = write(edits)
     found = call("advise", file, "--json").document
@@ -36,7 +34,7 @@ def test_advice_follows_rho_of_both_roles_and_names_the_smaller_rate(call, write
     assert found["neumann_body"] == best["neumann_body"] == (2 if edits == "stiff upper body" else 1)
 
 
-@pytest.mark.parametrize("edits", [None, "without friction", "local law", "stiff upper body"], ids=str)
+@pytest.mark.parametrize("edits", [None, "local law"], ids=str)
 def test_the_advice_does_not_depend_on_the_role_that_the_file_gives(call, write, edits):
     file = write(edits)
     text = file.read_text(encoding="utf-8")
@@ -45,18 +43,6 @@ def test_the_advice_does_not_depend_on_the_role_that_the_file_gives(call, write,
     assert a["neumann_body"] == b["neumann_body"]
     assert by_body(a) == by_body(b)
     assert a["roles"] == b["roles"][::-1]
-
-
-@pytest.mark.parametrize("neumann_body", [1, 2])
-def test_where_both_roles_are_the_same_the_file_keeps_its_own(call, write, neumann_body):
-    same = {"body1.x": "[0.4, 1.6]", "body1.cells": "[6, 2]", "body2.young": "7.0e4", "body2.cells": "[6, 2]"}
-    file = write(same | {"iteration.neumann_body": str(neumann_body)})
-    found = call("advise", file, "--json").document
-    one, two = (role["rho"]["value"] for role in found["roles"])
-    assert one == pytest.approx(two, rel=1e-9)
-    assert found["neumann_body"] in (1, 2)
-    if one == two:
-        assert found["neumann_body"] == neumann_body
 
 
 def test_advice_on_two_bars_is_that_of_their_stiffnesses(call, write):
@@ -96,12 +82,12 @@ def test_the_proved_theta_is_that_of_the_theorem_in_energy_norms(call, write, fr
 
 
 def test_nothing_is_proved_of_the_local_law(call, write):
-    found = call("advise", write("local law"), "--json").document
+    file = write("local law")
+    found, screen = call("advise", file, "--json").document, call("advise", file).out
     for role in found["roles"]:
         assert {role[name] for name in PROVED} == {None}
         assert all("local" in role["reason"][name] for name in PROVED)
     assert any("local" in reason for reason in found["outside_theorem"])
-    screen = call("advise", write("local law")).out
     assert "Outside the theorem: the local Coulomb law" in screen
     assert "proved     -" in screen
 
@@ -153,22 +139,14 @@ def test_a_role_in_which_a_body_can_move_is_singular_and_the_other_is_advised(ca
 # --- advise, from one run --------------------------------------------------------------------------------------------
 
 
-def tail_ratio(history):
-    """The ratio of consecutive residuals at the end of a history, over two steps."""
-    return math.sqrt(history[-1] / history[-3])
-
-
 @pytest.mark.parametrize(
     ("name", "theta", "rho", "within"),
-    [
-        ("two-bars", "0.45", "rho_max", 1e-5),
-        ("signorini", "0.95", "rho_normal", 1e-2),
-        ("section6", "0.95", "rho_max", 5e-2),
-    ],
+    [("two-bars", "0.45", "rho_max", 1e-5), ("signorini", "0.95", "rho_normal", 1e-2)],
 )
 def test_one_run_that_alternates_tells_rho(call, write, name, theta, rho, within):
     file = write(text=examples()[name])
-    ratio = tail_ratio(call("run", file, "--theta", theta, "--json").document["history"])
+    history = call("run", file, "--theta", theta, "--json").document["history"]
+    ratio = math.sqrt(history[-1] / history[-3])
     found = call("advise", "run", "--theta", theta, "--ratio", repr(ratio), "--json").document
     (role,) = found["roles"]
     assert role["rho"]["value"] == pytest.approx((1 + ratio) / float(theta) - 1, rel=1e-12)
@@ -226,18 +204,17 @@ def test_no_size_of_a_ratio_crashes_the_advice(call, theta, size):
         assert call("advise", "run", "--theta", theta, "--ratio", size).status == 0
 
 
-@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "-inf", "abc", "", "1e400", "1e-400", "1/0", "auto"])
-@pytest.mark.parametrize("name", ["ratio", "theta"])
+OUTSIDE = ["0", "-1", "nan", "inf", "abc", "", "1e400", "1e-400", "1/0"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [*itertools.product(["ratio", "theta"], OUTSIDE), ("theta", "1.0000000000000000000001")]
+)
 def test_a_ratio_or_theta_outside_its_meaning_is_refused(call, name, value):
     given = {"theta": "0.1", "ratio": "1.4"} | {name: value}
     complaint = call("advise", "run", "--theta", given["theta"], "--ratio", given["ratio"]).complaint
     assert f"--{name} = {value}" in complaint
     assert {"ratio": "a number > 0", "theta": "0 < theta <= 1"}[name] in complaint
-
-
-@pytest.mark.parametrize("theta", ["1.5", "1.0000000000000000000001"])
-def test_a_theta_above_1_is_refused(call, theta):
-    assert f"--theta = {theta}: needed" in call("advise", "run", "--theta", theta, "--ratio", "1.4").complaint
 
 
 @pytest.mark.parametrize(

@@ -5,16 +5,7 @@ import math
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from advice_calls import GOOD, ROLE, by_body, saved
-
-import verification as vf
-from verification.interface.pair import pair_from
-
-
-@pytest.fixture
-def matrices(write):
-    pair = pair_from(vf.load(write("wrong roles")))
-    return pair.contact.schur, pair.neumann.schur  # bodies 1 and 2
+from advice_calls import GOOD, ROLE, by_body, given, saved, wrong_roles
 
 
 def one_array(path, matrix):
@@ -35,10 +26,9 @@ HOW = {
 
 
 @pytest.mark.parametrize("how", HOW)
-def test_matrices_give_the_rho_of_the_problem(call, write, tmp_path, matrices, how):
-    S1, S2 = (saved(tmp_path, name, matrix, HOW[how]) for name, matrix in zip("ab", matrices, strict=True))
-    found = call("advise", "matrices", "--S1", S1, "--S2", S2, "--json").document
-    expected = call("advise", write("wrong roles"), "--json").document
+def test_matrices_give_the_rho_of_the_problem(call, tmp_path, how):
+    expected, matrices = wrong_roles()
+    found = call(*given(tmp_path, *matrices, HOW[how]), "--json").document
     assert found["schema"] == "ndtheory.advice/1"
     assert found["neumann_body"] == expected["neumann_body"] == 1
     for body, role in by_body(found).items():
@@ -49,21 +39,19 @@ def test_matrices_give_the_rho_of_the_problem(call, write, tmp_path, matrices, h
         assert "friction" in role["reason"]["friction_threshold"]
 
 
-def test_exchanged_matrices_exchange_the_advice(call, tmp_path, matrices):
-    S1, S2 = (saved(tmp_path, name, matrix) for name, matrix in zip("ab", matrices, strict=True))
-    found = call("advise", "matrices", "--S1", S1, "--S2", S2, "--json").document
-    swapped = call("advise", "matrices", "--S1", S2, "--S2", S1, "--json").document
+def test_exchanged_matrices_exchange_the_advice(call, tmp_path):
+    _, (S1, S2) = wrong_roles()
+    found, swapped = (call(*given(tmp_path, *both), "--json").document for both in ((S1, S2), (S2, S1)))
     assert {found["neumann_body"], swapped["neumann_body"]} == {1, 2}
     turned = {3 - body: role | {"neumann_body": 3 - body} for body, role in by_body(swapped).items()}
     assert turned == by_body(found)
 
 
-@pytest.mark.parametrize("unit", [1e-300, 1e-12, 1e12, 1e300])
-def test_the_unit_of_stiffness_does_not_change_the_advice(call, tmp_path, matrices, unit):
+@pytest.mark.parametrize("unit", [1e-300, 1e-12, 1e300])
+def test_the_unit_of_stiffness_does_not_change_the_advice(call, tmp_path, unit):
+    _, matrices = wrong_roles()
     largest = np.abs(matrices).max()
-    given = [saved(tmp_path, name, matrix) for name, matrix in zip("ab", matrices, strict=True)]
-    other = [saved(tmp_path, name, matrix / largest * unit) for name, matrix in zip("cd", matrices, strict=True)]
-    one, two = (call("advise", "matrices", "--S1", a, "--S2", b, "--json") for a, b in (given, other))
+    one, two = (call(*given(tmp_path, *both), "--json") for both in (matrices, [S / largest * unit for S in matrices]))
     assert two.err == ""
     assert one.document["neumann_body"] == two.document["neumann_body"]
     for a, b in zip(one.document["roles"], two.document["roles"], strict=True):
@@ -72,8 +60,7 @@ def test_the_unit_of_stiffness_does_not_change_the_advice(call, tmp_path, matric
 
 @pytest.mark.parametrize("times", [1e6, 1e60, 1e300])
 def test_a_body_far_stiffer_than_the_other_gets_the_neumann_problem_or_is_refused(call, tmp_path, times):
-    a, b = saved(tmp_path, "a", GOOD), saved(tmp_path, "b", GOOD * times)
-    answer = call("advise", "matrices", "--S1", a, "--S2", b, "--json")
+    answer = call(*given(tmp_path, GOOD, GOOD * times), "--json")
     if answer.status == 2:
         assert times > 1e75
         assert "b.npz" in answer.complaint
@@ -84,10 +71,8 @@ def test_a_body_far_stiffer_than_the_other_gets_the_neumann_problem_or_is_refuse
 
 
 def test_matrices_of_whole_numbers_are_read(call, tmp_path):
-    a, b = saved(tmp_path, "a", np.diag([1, 2, 3])), saved(tmp_path, "b", np.eye(3, dtype=np.int8))
-    found = by_body(call("advise", "matrices", "--S1", a, "--S2", b, "--json").document)
-    assert found[2]["rho"]["value"] == pytest.approx(3)
-    assert found[1]["rho"]["value"] == pytest.approx(1)
+    found = by_body(call(*given(tmp_path, np.diag([1, 2, 3]), np.eye(3, dtype=np.int8)), "--json").document)
+    assert (found[2]["rho"]["value"], found[1]["rho"]["value"]) == pytest.approx((3, 1))
 
 
 BAD = {
@@ -120,35 +105,26 @@ BAD = {
 @pytest.mark.parametrize("kind", BAD)
 def test_what_is_no_stiffness_matrix_is_refused_by_name(call, tmp_path, kind):
     matrix, fragments = BAD[kind]
-    complaint = call(
-        "advise",
-        "matrices",
-        "--S1",
-        saved(tmp_path, "a", GOOD),
-        "--S2",
-        saved(tmp_path, "b", matrix, np.savez_compressed),
-    ).complaint
+    complaint = call(*given(tmp_path, GOOD, matrix, np.savez_compressed)).complaint
     assert [fragment for fragment in ["b.npz", *fragments] if fragment not in complaint] == []
 
 
 @pytest.mark.parametrize("matrix", [np.diag([1.0, 0.0, 1.0]), np.ones((3, 3)) + 1e-17 * GOOD])
 def test_a_body_that_can_move_rigidly_is_refused_as_neumann_body_alone(call, tmp_path, matrix):
-    a, b = saved(tmp_path, "a", GOOD), saved(tmp_path, "b", matrix)
-    roles = by_body(call("advise", "matrices", "--S1", a, "--S2", b, "--json").document)
+    words = given(tmp_path, GOOD, matrix)
+    roles = by_body(call(*words, "--json").document)
     assert roles[1]["rho"]["value"] == pytest.approx(np.linalg.eigvals(np.linalg.solve(GOOD, matrix)).real.max())
     assert (roles[1]["singular"], roles[2]["singular"], roles[2]["rho"]) == (False, True, None)
     assert "S2 is singular" in roles[2]["reason"]["rho"]
-    assert "S2 is singular" in call("advise", "matrices", "--S1", a, "--S2", b).out
-    both = call("advise", "matrices", "--S1", b, "--S2", b).complaint
+    assert "S2 is singular" in call(*words).out
+    both = call("advise", "matrices", "--S1", words[-1], "--S2", words[-1]).complaint
     assert all(words in both for words in ("b.npz", "S1 is singular", "S2 is singular", "supports"))
 
 
 @pytest.mark.parametrize("kind", ["indefinite", "not symmetric", "not a number", "a vector"])
 def test_the_first_matrix_is_held_to_the_same(call, tmp_path, kind):
     matrix, fragments = BAD[kind]
-    complaint = call(
-        "advise", "matrices", "--S1", saved(tmp_path, "a", matrix), "--S2", saved(tmp_path, "b", GOOD)
-    ).complaint
+    complaint = call(*given(tmp_path, matrix, GOOD)).complaint
     assert [fragment for fragment in ["a.npz", "S1", *fragments] if fragment not in complaint] == []
 
 

@@ -4,8 +4,9 @@ import itertools
 import re
 
 import pytest
-from advice_calls import ROLE, pasted
+from advice_calls import ROLE, fits, pasted
 from complaints import assert_names
+from strategies import AT_NIGHT
 
 from verification.coupling.roles import TIED
 
@@ -26,12 +27,11 @@ MODULI = [("7e4,2e4", "0.3,0.3"), ("2e4,2e4", "0.3,0.3"), ("1,2", "1/2,0.3"), ("
 
 @pytest.mark.parametrize(("young", "poisson"), MODULI)
 def test_every_screen_fits_and_says_what_is_proved_and_what_is_not_claimed(call, young, poisson):
-    for options in OPTIONS:
+    for options in OPTIONS if AT_NIGHT else OPTIONS[MODULI.index((young, poisson)) % 2 :: 2]:
         answer = call("advise", "moduli", "--young", young, "--poisson", poisson, *options)
         assert (answer.status, answer.err) == (0, "")
         lines = answer.out.splitlines()
-        assert max(map(len, lines)) <= 80, options
-        assert len(lines) <= 46, options
+        fits(lines)
         assert "Proved for the continuum" in answer.out
         assert "Not claimed: a bound of rho from above with friction" in answer.out
         assert lines[-1].startswith("Next: ndtheory advise run --theta ")
@@ -69,13 +69,12 @@ def test_nothing_is_pasted_unless_a_mirror_image_fits_into_the_body_that_is_trie
     other = call("advise", "moduli", *GIVEN, *shaped("mirror-1")).out  # body 2 is no good Neumann body
     assert "TO PASTE" not in other
     assert "body 2, without friction" in other
-    fits = call("advise", "moduli", *GIVEN, *shaped("mirror-2"))
-    assert "neumann_body = 1\n" in fits.out
-    assert "WHICH RUN NEXT?" not in fits.out
+    image = call("advise", "moduli", *GIVEN, *shaped("mirror-2"))
+    assert "neumann_body = 1\n" in image.out
+    assert "WHICH RUN NEXT?" not in image.out
     document = call("advise", "moduli", *GIVEN, *shaped("mirror-2"), "--json").document
-    assert (
-        float(pasted(fits.out)) == document["next"]["theta"] == document["moduli"]["roles"][0]["start"]["theta_guess"]
-    )
+    start = document["moduli"]["roles"][0]["start"]
+    assert float(pasted(image.out)) == document["next"]["theta"] == start["theta_guess"]
 
 
 def test_without_friction_the_start_is_proved_and_with_friction_it_is_called_a_guess(call):
@@ -124,14 +123,12 @@ def test_the_three_kinds_of_bodies_have_different_numbers(call):
         (("--young", "7e4,2e4"), ["--poisson = None", "two numbers"]),
         (("--poisson", "0.3,0.3"), ["--poisson alone", "--young"]),
         (("--young", "7e4", "--poisson", "0.3,0.3"), ["--young = 7e4", "two numbers E1,E2"]),
-        (("--young", "1,2,3", "--poisson", "0.3,0.3"), ["--young = 1,2,3", "two numbers"]),
         (("--young", "", "--poisson", "0.3,0.3"), ["--young", "two numbers"]),
         (("--young", "-7e4,2e4", "--poisson", "0.3,0.3"), ["--young = -7e4", "E > 0"]),
         (("--young", "7e4,2e4", "--poisson", "0.3,0.6"), ["--poisson = 0.6", "-1 < nu <= 1/2"]),
         (("--young", "7e4,soft", "--poisson", "0.3,0.3"), ["--young = soft", "E > 0"]),
         (("my.toml", *GIVEN), ["received my.toml: needed options only"]),
         ((*GIVEN, "--theta", "0.3"), ["--theta is an option of ndtheory advise run"]),
-        ((*GIVEN, "--set", "contact.friction=0"), ["--set is an option of ndtheory advise FILE"]),
         ((*GIVEN, "--shape", "plane-stress,3d"), ["--shape", "one plane"]),
         ((*GIVEN, "--shape", "corners-1,corners-2"), ["--shape", "one corners"]),
         ((*GIVEN, "--shape", "corners-1,mirror-2"), ["--shape, mirror = 2", "ends in a corner"]),
@@ -141,14 +138,10 @@ def test_the_three_kinds_of_bodies_have_different_numbers(call):
         ((), ["no material", "--conductivity"]),
         (("--dt", "1"), ["--dt alone", "--density"]),
         (("--conductivity", "1"), ["--conductivity = 1", "two numbers"]),
-        (("--conductivity", "1,0"), ["--conductivity = 0", "> 0"]),
         (("--conductivity", "1,nan"), ["--conductivity = nan", "> 0"]),
         (("--conductivity", "1,1e13"), ["--conductivity = 1e13", "1e12"]),
         (("--conductivity", "1,2", "--dt", "1"), ["--capacity", "beside dt"]),
-        (
-            ("--conductivity", "1,2", "--capacity", "1,2", "--thickness", "1,1"),
-            ["--dt", "beside capacity and thickness"],
-        ),
+        ((*HEAT, "--capacity", "1,2", "--thickness", "1,1"), ["--dt", "beside capacity and thickness"]),
         (("--conductivity", "1,2", "--density", "1,2"), ["--density = 1,2", "no density beside conductivity"]),
         (("--conductivity", "1,2", "--young", "1,2"), ["--young = 1,2", "no young beside conductivity"]),
         (("--conductivity", "1,2", "--length", "1"), ["--length = 1", "no length beside conductivity"]),
@@ -187,8 +180,7 @@ def test_the_screens_of_heat_and_of_fluids_fit_and_have_their_words(call, name, 
     answer = call("advise", "moduli", *WAVES[name], *parallel)
     assert (answer.status, answer.err) == (0, "")
     lines, said = answer.out.splitlines(), " ".join(answer.out.split())
-    assert max(map(len, lines[:-1])) <= 80
-    assert len(lines) <= 46
+    fits(lines)
     heat = name.startswith("heat")
     words = ("fluxes", "temperatures") if heat else ("pressures", "displacements")
     assert f"solver reads {words[0]} and writes {words[1]}" in said
@@ -201,9 +193,7 @@ def test_the_screens_of_heat_and_of_fluids_fit_and_have_their_words(call, name, 
         assert float(pasted(answer.out)) == document["theta"]
         wanted = document["roles"][document["neumann_body"] - 1]["theta_tied"]
         if parallel:
-            wanted = next(
-                one["theta"] for one in document["parallel"] if one["neumann_body"] == document["neumann_body"]
-            )
+            wanted = {one["neumann_body"]: one["theta"] for one in document["parallel"]}[document["neumann_body"]]
         assert document["theta"] == pytest.approx(min(wanted, 0.99), rel=1e-3)
     else:
         assert "TO PASTE" not in answer.out
@@ -212,12 +202,6 @@ def test_the_screens_of_heat_and_of_fluids_fit_and_have_their_words(call, name, 
         rho = document["roles"][0]["rho"]["value"]
         assert document["next"]["theta"] == pytest.approx(1 / (2 + rho), rel=1e-3)
         assert ("diverges" in said) == (rho > 1) == ("begin with ten steps with theta = 1" not in said)
-
-
-def test_the_command_has_at_most_ten_options_beside_json_and_help(call):
-    shown = re.findall(r"^  (?:-\w, )?(--[a-z-]+)", call("advise", "moduli", "--help").out, re.M)
-    assert len(set(shown) - {"--json", "--help"}) <= 10
-    assert {"--conductivity", "--capacity", "--density", "--thickness", "--length", "--dt", "--parallel"} <= set(shown)
 
 
 def test_parallel_coupling_of_elastic_bodies_bounds_its_factor_from_below(call):

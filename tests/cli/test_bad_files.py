@@ -5,11 +5,11 @@ import os
 import re
 import zipfile
 
-import meshio
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from complaints import assert_names
+from mesh_writer import read_here, write_gmsh22
 
 from fem1d2d import rectangle
 from verification.coupling.matrix_files import read_matrix
@@ -33,27 +33,21 @@ ENDLESS = {"pipe": "this is a pipe or a device", "device": "this is a pipe or a 
 
 
 @pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
-@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve", "advise"])
-def test_a_problem_file_without_an_end_is_refused_unread(call, tmp_path, command, kind, says):
-    assert_names(call(command, endless(tmp_path / "problem.toml", kind)).complaint, "problem.toml", says)
-
-
-@pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
-def test_a_mesh_file_without_an_end_is_refused_unread(call, write, tmp_path, kind, says):
+def test_a_file_without_an_end_is_refused_unread(call, write, tmp_path, kind, says):
+    endless(tmp_path / "problem.toml", kind)
+    for command in ("run", "advise"):
+        assert_names(call(command, tmp_path / "problem.toml").complaint, "problem.toml", says)
     endless(tmp_path / "body1.msh", kind)
-    assert_names(call("run", write(MESHED)).complaint, "problem.toml", "body1.mesh", "body1.msh", says)
-
-
-@pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
-def test_a_matrix_without_an_end_is_refused_unread(call, tmp_path, kind, says):
+    meshed = write(MESHED, "meshed.toml")
+    assert_names(call("run", meshed).complaint, "meshed.toml", "body1.mesh", "body1.msh", says)
     bad = endless(tmp_path / "bad.npz", kind)
     np.save(tmp_path / "good.npy", np.eye(2))
     assert_names(call("advise", "matrices", "--S1", bad, "--S2", tmp_path / "good.npy").complaint, "bad.npz", says)
 
 
-@pytest.mark.parametrize("kind", ["pipe", "device"])
 @pytest.mark.parametrize(
-    ("command", "name"), [("run", "run.json"), ("compare", "report.html"), ("solve", "bodies.svg")]
+    ("kind", "command", "name"),
+    [("pipe", "run", "run.json"), ("device", "compare", "report.html"), ("device", "solve", "bodies.svg")],
 )
 def test_a_result_without_an_end_is_somebody_elses(call, write, tmp_path, kind, command, name):
     (tmp_path / "results").mkdir()
@@ -127,6 +121,19 @@ def test_a_matrix_whose_header_is_damaged_is_refused(call, tmp_path):
     )
 
 
+#: A column outside, a negative one, a row that ends outside, a last row that does.
+OUTSIDE = [([0, 10**6], [0, 1, 2]), ([0, -(10**6)], [0, 1, 2]), ([0, 1], [0, 10**6, 2]), ([0, 1], [0, 2, 10**6])]
+
+
+@pytest.mark.parametrize(("indices", "indptr"), OUTSIDE)
+def test_a_sparse_matrix_that_points_outside_itself_is_refused_and_not_followed(call, tmp_path, indices, indptr):
+    """A process that followed would end by a signal."""
+    good, bad = tmp_path / "good.npz", tmp_path / "bad.npz"
+    np.savez(good, np.eye(2))
+    np.savez(bad, format="csr", shape=(2, 2), data=np.ones(2), indices=np.array(indices), indptr=np.array(indptr))
+    assert "bad.npz" in call("advise", "matrices", "--S1", good, "--S2", bad).complaint
+
+
 @pytest.mark.parametrize("kind", ["csr", "csc", "coo", "dia", "bsr"])
 def test_a_sparse_matrix_of_every_kind_is_read(tmp_path, kind):
     full = np.diag([2.0, 3.0, 4.0, 5.0]) + np.eye(4, k=1) + np.eye(4, k=-1)
@@ -137,41 +144,24 @@ def test_a_sparse_matrix_of_every_kind_is_read(tmp_path, kind):
 # --- mesh files ---
 
 
-def mesh_file(
-    path,
-    x=(0.0, 2.0),
-    y=(-0.3, 0.0),
-    cells=(10, 2),
-    names=("left", "right", "bottom", "top"),
-    lift=None,
-    twice=False,
-    surfaces=(),
-):
+def mesh_file(path, y=(-0.3, 0.0), names=("left", "right", "bottom", "top"), lift=None, twice=False, surfaces=()):
     """The built-in rectangle as a Gmsh file.
 
     ``lift`` moves its upper side, ``twice`` doubles its cells, ``surfaces`` names equal parts of them.
     """
-    mesh = rectangle(x, y, cells)
-    listed = np.tile(mesh.cells, (2 if twice else 1, 1))
-    points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
+    mesh = rectangle((0.0, 2.0), y, (10, 2))
+    points = mesh.points.copy()
     if lift is not None:
         upper = points[:, 1] == y[1]
         points[upper, 1] += lift(points[upper, 0])
-    sides = ("left", "right", "bottom", "top")
-    tags = np.concatenate([np.full(len(mesh.sides[side]), i) for i, side in enumerate(sides, 1)])
-    inside = 9 + np.arange(len(listed)) * len(surfaces) // len(listed)
-    named = {name: np.array([i, 1]) for i, name in enumerate(names, 1)}
-    meshio.write(
-        path,
-        meshio.Mesh(
-            points,
-            [("line", np.concatenate([mesh.sides[side] for side in sides])), ("triangle", listed)],
-            cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
-            field_data=named | {name: np.array([i, 2]) for i, name in enumerate(surfaces, 9)},
-        ),
-        file_format="gmsh22",
-        binary=False,
-    )
+    sides = dict(zip(names, (mesh.sides[side] for side in ("left", "right", "bottom", "top")), strict=True))
+    write_gmsh22(path, points, np.tile(mesh.cells, (2 if twice else 1, 1)), sides, surfaces)
+
+
+@pytest.fixture
+def read_at_once(monkeypatch):
+    """Files of meshes are read in this process: those of these tests need no limits."""
+    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)
 
 
 MESHED = {"body1.mesh": '"body1.msh"'} | dict.fromkeys(f"body1.{key}" for key in ("shape", "x", "y", "cells"))
@@ -224,6 +214,7 @@ def test_a_hostile_mesh_file_is_refused_within_its_limits(call, write, tmp_path,
     assert_names(line, "problem.toml", "body1.mesh", name, *fragments)
 
 
+@pytest.mark.usefixtures("read_at_once")
 def test_a_body_of_two_materials_is_refused_with_their_names(call, write, tmp_path):
     mesh_file(tmp_path / "body1.msh", surfaces=("rubber", "steel"))
     line = call("run", write(MESHED)).complaint
@@ -232,6 +223,7 @@ def test_a_body_of_two_materials_is_refused_with_their_names(call, write, tmp_pa
     assert call("run", write(MESHED)).status == 0
 
 
+@pytest.mark.usefixtures("read_at_once")
 @pytest.mark.parametrize(
     ("changes", "fragments"),
     [
@@ -246,6 +238,7 @@ def test_a_mesh_that_does_not_fit_is_refused_by_name(call, write, tmp_path, chan
     assert_names(call("run", write(MESHED)).complaint, "problem.toml", *fragments)
 
 
+@pytest.mark.usefixtures("read_at_once")
 def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measured(call, write, tmp_path, monkeypatch):
     mesh_file(tmp_path / "body1.msh")
     monkeypatch.setattr("verification.constants.measuring.largest_sparse", None)
@@ -253,16 +246,16 @@ def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measur
     assert_names(line, "problem.toml", "body1.mesh", "body1.msh", "halved")
 
 
+@pytest.mark.usefixtures("read_at_once")
 @pytest.mark.parametrize(
-    ("fault", "says"),
+    ("command", "fault", "says"),
     [
-        (lambda lines: [*lines, lines[0]], "listed twice|2 times"),
-        (lambda lines: [*lines, [*lines[0][:-1], "12"]], "none of the boundary"),
-        (lambda lines: [*lines, lines[-1]], "have the same nodes"),
+        ("run", lambda lines: [*lines, lines[0]], "listed twice|2 times"),
+        ("compare", lambda lines: [*lines, [*lines[0][:-1], "12"]], "none of the boundary"),
+        ("solve", lambda lines: [*lines, lines[-1]], "have the same nodes"),
     ],
     ids=["a line twice", "a line inside", "a cell twice"],
 )
-@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve"])
 def test_a_malformed_mesh_is_refused_by_its_fault(call, write, tmp_path, command, fault, says):
     mesh_file(tmp_path / "body1.msh")
     head, _, rest = (tmp_path / "body1.msh").read_text().partition("$Elements\n")
@@ -276,6 +269,7 @@ def test_a_malformed_mesh_is_refused_by_its_fault(call, write, tmp_path, command
     assert "matching" not in line
 
 
+@pytest.mark.usefixtures("read_at_once")
 def test_a_mesh_with_every_cell_twice_is_refused_as_that(call, write, tmp_path):
     """Not for its grid on Gamma_c: no edge would be left on the boundary."""
     mesh_file(tmp_path / "body1.msh", twice=True)
@@ -284,9 +278,8 @@ def test_a_mesh_with_every_cell_twice_is_refused_as_that(call, write, tmp_path):
     assert "matching" not in line
 
 
-@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve"])
-def test_reading_a_mesh_prints_nothing_beside_the_document(call, write, tmp_path, command):
+def test_reading_a_mesh_prints_nothing_beside_the_document(call, write, tmp_path):
     mesh_file(tmp_path / "body1.msh")
-    answer = call(command, write(MESHED), "--json")
+    answer = call("solve", write(MESHED), "--json")
     assert (answer.status, answer.err) == (0, "")
     assert answer.document

@@ -1,9 +1,11 @@
 """Bad input: status 2, nothing on stdout, one line that names file, key, value received and what is needed."""
 
 import re
+from itertools import cycle
 
 import pytest
 from complaints import assert_names
+from strategies import AT_NIGHT
 
 from verification.cli.problems import examples
 
@@ -31,69 +33,44 @@ NO_NUMBERS = [
 #: What no single key may hold: key, value, what is needed.
 VALUES = [
     ("body1.young", "0", "a number > 0"),
-    ("body1.young", "-1", "a number > 0"),
     ("body1.poisson", "0.5", "a number with -1 < nu < 0.5"),
     ("body2.poisson", "-1", "a number with -1 < nu < 0.5"),
-    ("body2.poisson", '"1/2"', "a number with -1 < nu < 0.5"),
     ("contact.friction", "-1e-300", "a number >= 0"),
-    ("contact.radius", "0", "a number > 0"),
     ("contact.radius", "-0.1", "a number > 0"),
     ("contact.gap", "-1", "a number >= 0"),
     ("contact.law", '"coulomb"', 'one of "nonlocal", "local"'),
-    ("contact.law", "1", 'one of "nonlocal", "local"'),
-    ("iteration.theta", "0", "a number with 0 < theta < 1"),
     ("iteration.theta", "1", "a number with 0 < theta < 1"),
-    ("iteration.theta", "-0.5", "a number with 0 < theta < 1"),
-    ("iteration.theta", "1.5", "a number with 0 < theta < 1"),
-    ("iteration.tolerance", "0", "a number with 0 < tolerance < 1"),
-    ("iteration.tolerance", "-1e-9", "a number with 0 < tolerance < 1"),
     ("iteration.tolerance", "1", "a number with 0 < tolerance < 1"),
     ("iteration.max_iterations", "0", "a whole number >= 1"),
-    ("iteration.max_iterations", "-3", "a whole number >= 1"),
     ("iteration.max_iterations", "12.5", "a whole number >= 1"),
     ("iteration.max_iterations", "true", "a whole number >= 1"),
-    ("iteration.max_iterations", '"9"', "a whole number >= 1"),
     ("iteration.neumann_body", "3", "one of 1, 2"),
     ("iteration.neumann_body", "true", "one of 1, 2"),
-    ("iteration.neumann_body", '"1"', "one of 1, 2"),
     ("iteration.relaxation", '"faster"', '"constant"'),
     ("dimension", "3", "one of 1, 2"),
     ("dimension", "2.0", "one of 1, 2"),
-    ("dimension", "true", "one of 1, 2"),
     ("title", "1", "a text in quotes"),
-    ("title", '["a"]', "a text in quotes"),
     ("units.length", "1", "a text in quotes"),
     ("body1.shape", '"circle"', '"rectangle"'),
     ("body1.shape", '"interval"', '"rectangle"'),
     ("body1.cells", "[0, 2]", "whole number"),
-    ("body1.cells", "[10, -2]", "whole number"),
-    ("body1.cells", "[12.5, 2]", "whole number"),
-    ("body1.cells", "[10.0, 2]", "whole number"),
     ("body1.cells", "[true, 2]", "whole number"),
     ("body1.cells", "[10]", "two whole numbers"),
-    ("body1.cells", "[10, 2, 2]", "two whole numbers"),
     ("body1.cells", "10", "two whole numbers"),
     ("body1.cells", "[1000000, 1000000]", "at most"),
     ("body1.x", "[2.0, 0.0]", "a < b"),
-    ("body1.x", "[1.0, 1.0]", "a < b"),
     ("body1.x", "[0.0, 1.0, 2.0]", "a < b"),
-    ("body1.x", "[0.0, true]", "a < b"),
     ("contact.interval", "[1.6, 0.4]", "a < b"),
     ("body1.fixed", '["bottum"]', "left, right, bottom, top"),
-    ("body1.fixed", '["Bottom"]', "left, right, bottom, top"),
     ("body1.fixed", '["bottom", "bottom"]', "once"),
     ("body1.fixed", '"bottom"', "a list of side names"),
-    ("body1.fixed", "[1]", "a list of side names"),
     ("body2.prescribed", '["top"]', "a table"),
     ("body2.prescribed", "{ middle = [0, 0] }", "left, right, bottom, top"),
     ("body2.prescribed", "{ top = -0.015 }", "two numbers, along x and y"),
-    ("body2.prescribed", "{ top = [0.0, -0.015, 0.0] }", "two numbers, along x and y"),
     ("body2.prescribed", '{ top = ["fixed", -0.015] }', '"free"'),
     ("body1.prescribed", "{ bottom = [0.0, 0.0] }", "fixed already"),
-    ("body1.traction", "{ middle = [0.0, 1.0] }", "left, right, bottom, top"),
     ("body1.traction", "{ bottom = [0.0, 1.0] }", "held"),
     ("body1.traction", '{ left = ["free", 1.0] }', "two numbers, along x and y"),
-    ("body1.body_force", "1.0", "two numbers, along x and y"),
 ]
 
 BESIDE_SHAPE = ["x", "y", "cells", "young", "poisson", "fixed", "body_force"]
@@ -148,9 +125,7 @@ TOGETHER = {
     "drawn into each other": ({"body2.y": "[-0.1, 0.3]"}, ["body2.y", "lie in each other", "y = -0.1", "5 %", "0.3"]),
     "the upper body first": ({"body1.y": "[0.3, 0.6]"}, ["body2.y", "lie in each other", "y = 0.6", "y = 0"]),
     "apart along x": ({"body2.x": "[3.0, 4.2]"}, ["body2.x", "do not meet", "0 to 2", "3 to 4.2"]),
-    "corner to corner": ({"body2.x": "[2.0, 3.2]"}, ["body2.x", "do not meet"]),
     "an interval outside the overlap": ({"contact.interval": "[0.2, 1.6]"}, ["contact.interval", "[0.4, 1.6]"]),
-    "an interval far from the overlap": ({"contact.interval": "[5.0, 6.0]"}, ["contact.interval", "[0.4, 1.6]"]),
     "an interval that ends between nodes": (
         {"contact.interval": "[0.5, 1.5]"},
         ["contact.interval", "begin and end at nodes", "0.4, 0.6, 1.4, 1.6"],
@@ -185,11 +160,8 @@ BARS = {
 #: What is no problem file at all: bytes, then fragments.
 CONTENTS = {
     "an empty file": (b"", ["empty", "ndtheory example"]),
-    "a blank file": (b" \n\t\n", ["empty", "ndtheory example"]),
     "comments alone": (b"# nothing\n", ["body1", "missing"]),
     "malformed TOML": (b"[body1\nx = 1", ["not TOML", "line 1"]),
-    "an unclosed string": (b'title = "a\n', ["not TOML", "line 1"]),
-    "a key set twice": (b"title = 'a'\ntitle = 'b'\n", ["not TOML", "line 2"]),
     "a table opened twice": (b"[norm]\nlength = 1\n[norm]\n", ["not TOML", "norm", "line 3"]),
     "binary rubbish": (bytes(range(256)) * 8, ["UTF-8"]),
     "half a letter of UTF-16": ("title = 'a'".encode("utf-16")[:-1], ["UTF-8"]),
@@ -198,19 +170,22 @@ CONTENTS = {
     "brackets without end": (b"a = " + b"[" * 100_000, ["not TOML"]),
     "a number of 9999 digits": (b"a = " + b"9" * 9999, ["line 1", "too many digits", "up to 1e+30"]),
     "an exponent of 20 digits": (b"a = 1\nb = 1e" + b"9" * 20, ["line 2", "too many digits"]),
-    "JSON": (b'{"title": "a"}', ["not TOML", "line 1"]),
 }
 
 
-@pytest.mark.parametrize("value", NO_NUMBERS)
-@pytest.mark.parametrize(("key", "needed"), NUMBERS.items(), ids=NUMBERS)
+def each_value_and_each_key(keys, *whole):
+    """Every value for some of the keys, three kinds of them for the others."""
+    few = ["true", "nan", '"x"']
+    return [(key, needed, value) for key, needed in keys.items() for value in (NO_NUMBERS if key in whole else few)]
+
+
+@pytest.mark.parametrize(("key", "needed", "value"), each_value_and_each_key(NUMBERS, "body1.young", "iteration.theta"))
 def test_what_is_no_number_is_refused_where_a_number_is_needed(call, write, key, needed, value):
     shown = [] if key == "iteration.theta" and value in ("{}", "[]") else [value]
     assert_names(call("run", write({key: value})).complaint, "problem.toml", f"{key} = ", *shown, f"needed {needed}")
 
 
-@pytest.mark.parametrize("value", NO_NUMBERS)
-@pytest.mark.parametrize(("key", "needed"), PAIRS.items(), ids=PAIRS)
+@pytest.mark.parametrize(("key", "needed", "value"), each_value_and_each_key(PAIRS, "body1.x"))
 def test_what_is_no_number_is_refused_within_a_pair(call, write, key, needed, value):
     assert_names(call("run", write({key: f"[0.4, {value}]"})).complaint, "problem.toml", f"{key} = ", value, needed)
 
@@ -221,8 +196,13 @@ def test_a_value_that_does_not_fit_is_refused_by_name(call, write, key, value, n
     assert_names(call("run", write({key: value})).complaint, "problem.toml", key, received, needed)
 
 
-@pytest.mark.parametrize("value", ["3", "[]", '"x"', "[{x = 1}]", "true"])
-@pytest.mark.parametrize("table", ["units", "body1", "body2", "contact", "iteration", "norm"])
+@pytest.mark.parametrize(
+    ("table", "value"),
+    [
+        *[("contact", value) for value in ("3", "[]", '"x"', "[{x = 1}]", "true")],
+        *[("units", "3"), ("body1", "[]"), ("body2", '"x"'), ("iteration", "[{x = 1}]"), ("norm", "true")],
+    ],
+)
 def test_a_table_that_is_none_is_refused_by_name(call, write, table, value):
     file = write({table: value})
     file.write_text(file.read_text("utf-8").replace(f"[{table}]", "[elsewhere]"), encoding="utf-8")
@@ -232,8 +212,11 @@ def test_a_table_that_is_none_is_refused_by_name(call, write, table, value):
     assert_names(call("run", file).complaint, "problem.toml", *named)
 
 
-@pytest.mark.parametrize("command", ["run", "compare", "constants"])
-@pytest.mark.parametrize(("edits", "fragments"), TOGETHER.values(), ids=TOGETHER)
+@pytest.mark.parametrize(
+    ("command", "edits", "fragments"),
+    [(command, *case) for command, case in zip(cycle(["run", "compare", "constants"]), TOGETHER.values())],
+    ids=TOGETHER,
+)
 def test_what_does_not_fit_together_is_refused_by_name(call, write, command, edits, fragments):
     assert_names(call(command, write(edits)).complaint, "problem.toml", *fragments)
 
@@ -247,13 +230,8 @@ def test_bars_are_refused_what_only_plane_bodies_have(call, write, edits, fragme
 @pytest.mark.parametrize(
     ("key", "guess"),
     [
-        ("titel", "title"),
-        ("body1.yuong", "young"),
         ("body2.presribed", "prescribed"),
-        ("contact.fricton", "friction"),
-        ("iteration.max_iteration", "max_iterations"),
         ("iteration.Theta", "theta"),
-        ("norm.lenght", "length"),
         ("units.time", "stress"),
         ("mesh.cells", "norm"),
         ("contact.mu", "friction"),
@@ -264,7 +242,7 @@ def test_an_unknown_key_or_table_is_refused_with_the_known_ones(call, write, key
     assert_names(line, "problem.toml", key.removesuffix(".cells"), "unknown", guess)
 
 
-@pytest.mark.parametrize("key", ["body1.shape", "body1.x", "body1.young", "body1.poisson", "body2.y", "body2.cells"])
+@pytest.mark.parametrize("key", ["body1.young", "body2.cells"])
 def test_a_missing_key_is_named(call, write, key):
     assert_names(call("run", write({key: None})).complaint, "problem.toml", key, "missing")
 
@@ -276,17 +254,16 @@ def test_what_is_no_problem_file_is_refused(call, tmp_path, content, fragments):
     assert_names(call("run", file).complaint, "problem.toml", *fragments)
 
 
-@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve"])
 @pytest.mark.parametrize(
-    ("name", "needed"),
+    ("command", "name", "needed"),
     [
-        ("missing.toml", "no such file"),
-        ("missing/problem.toml", "no such file"),
-        ("folder", "folder"),
-        ("problem.toml/inside", "directory"),
-        ("loop", "symbolic links"),
-        ("n" * 300, "too long"),
-        ("\N{GREEK SMALL LETTER RHO}.toml", "no such file"),
+        ("run", "missing.toml", "no such file"),
+        ("run", "missing/problem.toml", "no such file"),
+        ("compare", "folder", "folder"),
+        ("constants", "problem.toml/inside", "directory"),
+        ("solve", "loop", "symbolic links"),
+        ("run", "n" * 300, "too long"),
+        ("run", "\N{GREEK SMALL LETTER RHO}.toml", "no such file"),
     ],
     ids=lambda v: v[:20],
 )
@@ -358,7 +335,7 @@ def test_what_was_received_is_not_repeated_at_length(call, write, tmp_path, edit
     assert len(line.replace(str(tmp_path), "")) < 700
 
 
-@pytest.mark.parametrize("command", ["constants", "compare", "run", "advise"])
+@pytest.mark.parametrize("command", ["compare", "advise"])
 def test_moduli_that_doubles_cannot_hold_side_by_side_are_refused(call, write, command):
     line = call(command, write({"body1.young": "1e30", "body2.young": "1e-30"})).complaint
     assert_names(
@@ -374,12 +351,15 @@ def test_moduli_that_doubles_cannot_hold_side_by_side_are_refused(call, write, c
 # --- numbers that a file may hold and arithmetic may not ---
 
 
-@pytest.mark.parametrize("value", ["1e300", "1e150", "1e-150", "1e-300"])
+SIZES = ["1e300", "1e-300", *["1e150", "1e-150"] * AT_NIGHT]
+
+
+@pytest.mark.parametrize("value", SIZES)
 @pytest.mark.parametrize(
     "key", ["body1.young", "body2.young", "contact.friction", "contact.radius", "contact.gap", "norm.length"]
 )
 def test_no_size_of_a_number_crashes_a_command(call, write, key, value):
-    for command in ("constants", "run", "solve", "compare"):
+    for command in ("solve", "compare", *["constants", "run"] * AT_NIGHT):
         answer = call(command, write({key: value}), "--json")
         assert "Traceback" not in answer.err
         if answer.status == 2:
@@ -388,7 +368,7 @@ def test_no_size_of_a_number_crashes_a_command(call, write, key, value):
             assert answer.document
 
 
-@pytest.mark.parametrize("value", ["1e300", "1e150", "1e-150", "1e-300"])
+@pytest.mark.parametrize("value", SIZES)
 @pytest.mark.parametrize("option", ["--m", "--M", "--CR", "--Cs", "--Ctr", "--k"])
 def test_no_size_of_a_constant_crashes_the_calculator(call, option, value):
     given = {"--m": "1", "--M": "2", "--CR": "1", "--Cs": "1", "--Ctr": "1", "--k": "0"} | {option: value}

@@ -9,24 +9,10 @@ import pytest
 import ndtheory
 from verification.cli.problems import examples
 
-COMMANDS = [
-    "example",
-    "demo",
-    "bounds",
-    "constants",
-    "run",
-    "solve",
-    "compare",
-    "advise",
-    "certify",
-    "region",
-    "sweep",
-    "reproduce",
-    "verify",
-]
-ADVISE = ["advise matrices", "advise run", "advise moduli"]
+COMMANDS = ["example", "demo", "bounds", "constants", "run", "solve", "compare", "advise", "certify", "region"]
+COMMANDS += ["sweep", "reproduce", "verify"]
+ADVISE = ["explore", "advise matrices", "advise run", "advise moduli"]
 CONSTANTS = ["--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8"]
-LATER = ["explore"]
 
 #: Exit status of (run, compare) on each built-in problem; `inside` ends at its limit, which compare does not mind.
 BUILT_IN = {"inside": (1, 0), "section6": (0, 0), "section6-190": (0, 0), "signorini": (0, 0), "two-bars": (0, 0)}
@@ -55,20 +41,17 @@ HEADINGS = {
 
 #: Edits whose screens hold what others do not: reasons, rates next to 1, other rules.
 TOLD = [
-    *[None, "apart", "unloaded", "without friction", "held tangentially", "local law", "wrong roles"],
-    *["soft upper body", "stiff upper body", {"iteration.theta": '"auto"', "contact.friction": "3"}],
-    *({"iteration.relaxation": f'"{relaxation}"'} for relaxation in ("aitken", "anderson", "newton", "momentum")),
+    *["without friction", "held tangentially", "local law", "soft upper body"],
+    *[{"iteration.theta": '"auto"', "contact.friction": "3"}, {"iteration.relaxation": '"newton"'}],
+    {"iteration.relaxation": '"momentum"'},
 ]
 
 
 @pytest.fixture
-def built_in(tmp_path):
-    def write(name):
-        path = tmp_path / f"{name}.toml"
-        path.write_text(examples()[name], encoding="utf-8")
-        return path
-
-    return write
+def built_in(write, tmp_path, monkeypatch):
+    """``built_in(name)``: a built-in problem in the current folder, its file."""
+    monkeypatch.chdir(tmp_path)
+    return lambda name: write(name=f"{name}.toml", text=examples()[name]).name
 
 
 # --- help ---
@@ -81,17 +64,13 @@ def test_the_command_alone_shows_its_help_and_asks_for_a_command(call):
 
 
 @pytest.mark.parametrize("command", [*COMMANDS, *ADVISE])
-def test_every_help_has_an_example_and_fits_the_screen(call, command):
+def test_every_help_has_an_example_explains_every_option_and_fits_the_screen(call, command):
     answer = call(*command.split(), "--help")
     assert (answer.status, answer.err) == (0, "")
     assert f"  ndtheory {command} " in answer.out.partition("Example")[2]
     assert max(map(len, answer.out.splitlines())) <= 80
     assert call(*command.split(), "-h") == answer
-
-
-@pytest.mark.parametrize("command", [*COMMANDS, *ADVISE])
-def test_every_option_is_explained(call, command):
-    options = call(*command.split(), "--help").out.partition("Options:\n")[2]
+    options = answer.out.partition("Options:\n")[2]
     entries = re.split(r"^  (?=-)", options, flags=re.M)[1:]
     assert entries
     assert [entry for entry in entries if not re.search(r"(?m)(^ {20,}|  )[A-Z]\w* .*\w", entry)] == []
@@ -99,12 +78,6 @@ def test_every_option_is_explained(call, command):
 
 def test_the_version_is_that_of_the_theory(call):
     assert call("--version").out == f"ndtheory {ndtheory.__version__}\n"
-
-
-@pytest.mark.parametrize("command", LATER)
-def test_what_is_not_there_yet_is_refused_by_name(call, command):
-    answer = call(command, "--help")
-    assert answer.status == 0 or command in answer.complaint
 
 
 # --- example ---
@@ -130,12 +103,15 @@ def test_every_built_in_problem_has_its_expected_status():
 # --- screens ---
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
-@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare"])
-def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monkeypatch, tmp_path, command, name):
-    monkeypatch.chdir(tmp_path)
-    built_in(name)
-    answer = call(command, f"{name}.toml")
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        *(("compare", name) for name in BUILT_IN),
+        *[("run", "inside"), ("run", "two-bars"), ("solve", "signorini"), ("constants", "section6-190")],
+    ],
+)
+def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, command, name):
+    answer = call(command, built_in(name))
     assert answer.status == dict(zip(("run", "compare"), BUILT_IN[name], strict=True)).get(command, 0)
     lines = answer.out.splitlines()
     assert lines[0].startswith(tomllib.loads(examples()[name])["title"])
@@ -145,11 +121,9 @@ def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monke
     assert [line for line in lines if len(line) > 80] == []
 
 
-@pytest.mark.parametrize("name", BUILT_IN)
-def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, monkeypatch, tmp_path, name):
-    monkeypatch.chdir(tmp_path)
-    built_in(name)
-    answer = call("advise", f"{name}.toml")
+@pytest.mark.parametrize("name", ["section6-190", "signorini", "two-bars"])
+def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, name):
+    answer = call("advise", built_in(name))
     lines = answer.out.splitlines()
     assert (answer.status, answer.err) == (0, "")
     asked = [head for head in HEADINGS["advise"] if "FRICTION" not in head or name not in ("signorini", "two-bars")]
@@ -159,14 +133,24 @@ def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, monkeypatc
     assert [line for line in lines if len(line) > 80] == []
 
 
-@pytest.mark.parametrize("edits", TOLD, ids=str)
-@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare", "advise"])
-def test_whatever_a_screen_has_to_tell_fits_into_80_columns(call, write, monkeypatch, tmp_path, command, edits):
+@pytest.mark.parametrize(
+    ("command", "edits"),
+    [
+        *(("compare", edits) for edits in TOLD),
+        *(("run", edits) for edits in ("wrong roles", "stiff upper body", *TOLD[-3:])),
+        *[("constants", "soft upper body"), ("advise", "local law"), ("advise", "soft upper body"), ("solve", "apart")],
+    ],
+    ids=str,
+)
+def test_whatever_a_screen_has_to_tell_fits_into_80_columns_and_what_to_type_next_is_accepted(
+    call, write, monkeypatch, tmp_path, command, edits
+):
     monkeypatch.chdir(tmp_path)
     write(edits)
     lines = call(command, "problem.toml").out.splitlines()
-    assert lines
     assert [line for line in lines if len(line) > 80] == []
+    following = lines[-1].removeprefix("Next: ndtheory ")
+    assert call(*shlex.split(following)).status != 2
 
 
 def test_the_calculator_answers_on_one_screen(call):
@@ -189,20 +173,11 @@ def test_no_conclusion_is_no_error_and_a_factor_near_one_shows_its_distance_from
     assert repaired.endswith("contracts")
 
 
-@pytest.mark.parametrize("stress", ["MPa", "Pa", "ksi"])
-def test_stresses_carry_the_unit_of_the_file(call, write, stress):
-    file = write({"units.stress": f'"{stress}"', "units.length": '"in"'})
-    screen = call("compare", file).out
-    assert f"E 70000 / 20000 {stress}" in screen
-    assert f"{stress} in (per unit thickness)" in screen
+def test_stresses_carry_the_unit_of_the_file(call, write):
+    screen = call("compare", write({"units.stress": '"ksi"', "units.length": '"in"'})).out
+    assert "E 70000 / 20000 ksi" in screen
+    assert "ksi in (per unit thickness)" in screen
     assert "r = 0.3 in" in screen
-
-
-@pytest.mark.parametrize("edits", [None, "soft upper body", "stiff upper body", "inside the theorem", "local law"])
-@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare", "advise"])
-def test_what_to_type_next_is_accepted(call, write, command, edits):
-    following = call(command, write(edits)).out.splitlines()[-1].removeprefix("Next: ndtheory ")
-    assert call(*shlex.split(following)).status != 2
 
 
 def test_what_to_type_next_can_be_pasted_where_the_file_name_has_a_space(call, write):
@@ -211,21 +186,15 @@ def test_what_to_type_next_can_be_pasted_where_the_file_name_has_a_space(call, w
     assert shlex.split(following) == ["compare", str(file)]
 
 
-@pytest.mark.parametrize("columns", ["1", "20", "500", "x"])
-def test_the_width_of_the_terminal_does_not_change_a_result(call, write, monkeypatch, columns):
+def test_the_width_of_the_terminal_does_not_change_a_result(call, write, monkeypatch):
     file = write()
     expected = call("compare", file)
-    monkeypatch.setenv("COLUMNS", columns)
-    assert call("compare", file) == expected
+    for columns in ("1", "500", "x"):
+        monkeypatch.setenv("COLUMNS", columns)
+        assert call("compare", file) == expected
 
 
-@pytest.mark.parametrize("cells", [("[20, 4]", "[12, 4]"), ("[40, 5]", "[24, 5]"), ("[30, 4]", "[18, 4]")])
-def test_the_constants_of_an_ordinary_mesh_are_measured(call, write, cells):
-    file = write(dict(zip(("body1.cells", "body2.cells"), cells, strict=True)))
-    assert call("constants", file).status == 0
-
-
-@pytest.mark.parametrize("title", ["a\\u001b[2Jb", "a\\u0007b", "a\\nNext: b", "a\\rb"])
+@pytest.mark.parametrize("title", ["a\\u001b[2Jb", "a\\nNext: b"])
 def test_a_title_cannot_take_over_the_screen(call, write, title):
     complaint = call("run", write({"title": f'"{title}"'})).complaint
     assert complaint.isprintable()
@@ -292,14 +261,13 @@ def test_an_edition_is_shown_alone(call, edition):
     assert shown == (["printed", "repaired"] if edition == "both" else [edition])
 
 
-@pytest.mark.parametrize("neumann_body", [1, 2])
-def test_swapped_roles_are_those_of_a_file_with_the_other_neumann_body(call, write, neumann_body):
+@pytest.mark.parametrize(("command", "neumann_body"), [("run", 2), ("compare", 1)])
+def test_swapped_roles_are_those_of_a_file_with_the_other_neumann_body(call, write, command, neumann_body):
     file = write({"iteration.neumann_body": str(neumann_body), "iteration.max_iterations": "5"}, "a.toml")
     other = write({"iteration.neumann_body": str(3 - neumann_body), "iteration.max_iterations": "5"}, "b.toml")
-    for command in ("run", "compare"):
-        swapped = call(command, file, "--swap-roles", "--json").document
-        assert (swapped if command == "run" else swapped["run"])["neumann_body"] == 3 - neumann_body
-        assert swapped == call(command, other, "--json").document
+    swapped = call(command, file, "--swap-roles", "--json").document
+    assert (swapped if command == "run" else swapped["run"])["neumann_body"] == 3 - neumann_body
+    assert swapped == call(command, other, "--json").document
 
 
 def test_theta_on_the_command_line_stands_over_that_of_the_file(call, write):
@@ -307,7 +275,7 @@ def test_theta_on_the_command_line_stands_over_that_of_the_file(call, write):
     assert call("run", write(name="b.toml"), "--theta", "0.55", "--json").document == from_file
 
 
-@pytest.mark.parametrize("edits", [None, "local law", "without friction", "wrong roles"])
+@pytest.mark.parametrize("edits", [None, "local law"])
 def test_every_solver_finds_the_same_pressure(call, write, edits):
     few = ["run", write(edits), "--theta", "0.1", "--set", "iteration.max_iterations=15"]
     documents = {
@@ -323,18 +291,12 @@ def test_every_solver_finds_the_same_pressure(call, write, edits):
     assert documents["cvxpy"]["solves"]["active_set"] == 0
 
 
-@pytest.mark.parametrize("levels", [1, 2])
-def test_refine_adds_one_column_for_each_halving(call, write, levels):
+def test_refine_adds_one_column_for_each_halving_where_m_falls_and_M_rises_towards_the_continuum(call, write):
     file = write()
-    document = call("constants", file, "--refine", levels, "--json").document
-    nodes = [level["body1"]["nodes"] for level in document["levels"]]
-    assert nodes == [(10 * 2**i + 1) * (2 * 2**i + 1) for i in range(levels + 1)]
-    row = next(line for line in call("constants", file, "--refine", levels).out.splitlines() if "C_R" in line)
-    assert len(row.split()) == levels + 2
-
-
-def test_refine_shows_that_m_falls_and_M_rises_towards_the_continuum(call, write):
-    coarse, fine = call("constants", write(), "--refine", 1, "--json").document["levels"]
+    coarse, *_, fine = levels = call("constants", file, "--refine", 2, "--json").document["levels"]
+    assert [level["body1"]["nodes"] for level in levels] == [(10 * 2**i + 1) * (2 * 2**i + 1) for i in range(3)]
+    row = next(line for line in call("constants", file, "--refine", 2).out.splitlines() if "C_R" in line)
+    assert len(row.split()) == 4
     assert fine["m"]["value"] < coarse["m"]["value"]
     assert fine["M"]["value"] > coarse["M"]["value"]
 
@@ -342,7 +304,7 @@ def test_refine_shows_that_m_falls_and_M_rises_towards_the_continuum(call, write
 # --- what goes where ---
 
 
-@pytest.mark.parametrize("command", ["run", "solve", "compare"])
+@pytest.mark.parametrize("command", ["solve", "compare"])
 def test_warnings_go_to_stderr_and_leave_the_document_alone(call, write, command):
     answer = call(command, write({"contact.radius": "0.1"}), "--json")
     assert "contact.radius = 0.1 is below the mesh width 0.2" in answer.err
@@ -361,27 +323,19 @@ def test_a_radius_of_one_cell_is_not_below_the_mesh_width(call, write, radius, c
     [
         ["example", "--json"],
         ["example", "two-bars", "--json"],
-        ["bounds", *CONSTANTS, "--json"],
-        ["constants", "FILE", "--json"],
-        ["run", "FILE", "--json"],
-        ["solve", "FILE", "--json"],
-        ["compare", "FILE", "--json"],
-        ["advise", "FILE", "--json"],
         ["advise", "run", "--theta", "0.1", "--ratio", "1.4", "--json"],
-        ["bounds", "--rho", "3", "--json"],
         ["demo", "-o", "FOLDER", "--json"],
     ],
     ids=lambda a: " ".join(a[:1]),
 )
-def test_json_puts_one_document_on_stdout_and_its_warnings_alone_on_stderr(call, quick, write, tmp_path, arguments):
-    places = {"FILE": write(), "FOLDER": tmp_path / "demo"}
-    answer = call(*(places.get(argument, argument) for argument in arguments))
+def test_json_puts_one_document_on_stdout_and_its_warnings_alone_on_stderr(call, quick, tmp_path, arguments):
+    answer = call(*(tmp_path / "demo" if argument == "FOLDER" else argument for argument in arguments))
     warned = "".join(f"warning: {words}\n" for words in (answer.document.get("run") or {}).get("warnings", ()))
     assert (answer.status, answer.err) == (0, warned)
     assert {"schema", "version", "units"} <= set(answer.document)
 
 
-@pytest.mark.parametrize("command", ["run", "solve", "compare"])
+@pytest.mark.parametrize("command", ["solve", "compare"])
 def test_a_gamma_c_that_is_too_short_is_warned_of_and_ends_no_command(call, write, command):
     answer = call(command, write({"contact.interval": "[0.6, 1.4]"}), "--json")
     (warning,) = answer.err.splitlines()
@@ -401,14 +355,8 @@ def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(
     assert strained.startswith("warning: the largest principal strain is 5.8 %")
     assert written == "written: ndtheory-demo"
     assert {path.name for path in folder.iterdir()} == {
-        "problem.toml",
-        "report.html",
-        "contact.csv",
-        "history.csv",
-        "interface.npz",
-        "compare.json",
-        "body1.vtu",
-        "body2.vtu",
+        *{"problem.toml", "report.html", "contact.csv", "history.csv", "interface.npz", "compare.json"},
+        *{"body1.vtu", "body2.vtu"},
         *(f"{figure}.{ending}" for figure in ("bodies", "residuals", "waterfall") for ending in ("svg", "png")),
     }
     assert (folder / "problem.toml").read_text(encoding="utf-8") == examples()["section6"]
@@ -418,7 +366,7 @@ def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(
     assert (folder / "problem.toml").read_text(encoding="utf-8") == "edited"
 
 
-@pytest.mark.parametrize("command", ["run", "solve", "compare"])
+@pytest.mark.parametrize("command", ["solve", "compare"])
 def test_the_written_document_is_that_of_stdout(call, quick, write, tmp_path, command):
     answer = call(command, write(), "-o", tmp_path / "results", "--json")
     assert (tmp_path / "results" / f"{command}.json").read_text(encoding="utf-8") == answer.out

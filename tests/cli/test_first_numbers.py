@@ -68,6 +68,9 @@ ORDER = [
     "--- matplotlib",
 ]
 
+#: What a comparison says on a terminal that it is doing.
+STAGES = ["measuring", "iterating", "linearising", "repeating the run by cvxpy", "searching", "semidefinite bound"]
+
 
 def test_a_reader_has_each_table_before_what_is_slower_begins(write, tmp_path):
     found = ended(MARKED, "compare", write(), "-o", tmp_path / "results")
@@ -95,7 +98,7 @@ def test_a_document_is_written_last_and_alone(write, capfd, monkeypatch):
     assert json.loads(begin + document)["schema"] == "ndtheory.compare/1"
 
 
-@pytest.mark.parametrize("edits", [None, "without friction", "held tangentially", "wrong roles", "apart"], ids=str)
+@pytest.mark.parametrize("edits", ["held tangentially", "wrong roles", "apart"], ids=str)
 def test_the_parts_make_the_view_of_a_notebook(call, write, edits):
     """A command says on stderr which change may let a run converge, a notebook among the parts."""
     file = write(edits)
@@ -223,14 +226,18 @@ def test_a_reader_that_goes_away_costs_no_file(write, tmp_path):
     assert (tmp_path / "results" / "report.html").exists()
 
 
-def test_the_live_line_of_a_terminal_makes_room_for_each_part(call, write, monkeypatch):
+def test_the_live_line_of_a_terminal_names_what_is_done_and_makes_room_for_each_part(
+    call, quick, write, tmp_path, monkeypatch
+):
     def none(run):
         raise ContactError("not asked for")
 
     monkeypatch.setattr(comparison, "by_cvxpy_alone", none)
-    file = write("without friction")
-    expected = call("compare", file).out.splitlines()
-    text = on_a_terminal("compare", file, code=SKETCHED, columns=200, streams=["stdout", "stderr"])
+    command = ["compare", write("without friction"), "-o", tmp_path / "results"]
+    expected = call(*command).out.splitlines()
+    text = on_a_terminal(*command, code=SKETCHED, columns=200, streams=["stdout", "stderr"])
     lines = [line.split("\r")[-1] for line in text.replace("\r\n", "\n").split("\n")]  # what a line ends as
-    assert "measuring" in text
+    found = [text.find(stage) for stage in [*STAGES, "drawing and writing"]]
+    assert -1 not in found
+    assert found == sorted(found)
     assert [line for line in lines if line in expected and line] == [line for line in expected if line]

@@ -30,6 +30,24 @@ def written(path):
     return folder
 
 
+@pytest.fixture(scope="module")
+def document(written):
+    return json.loads((written / "history.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def monolithic(path):
+    return vf.march(path, method="monolithic")
+
+
+@pytest.fixture
+def short(tmp_path):
+    """Two increments of the same history."""
+    data = pressed_and_sheared({"press": (2, [0, "-0.01"])})
+    (file := tmp_path / "short.toml").write_text(vf.Problem.from_dict(data).to_toml())
+    return file
+
+
 def test_the_screen_has_a_row_for_each_step_and_what_the_theorem_says(call, path):
     answer = call("march", path)
     assert answer.status == 0
@@ -42,9 +60,8 @@ def test_the_screen_has_a_row_for_each_step_and_what_the_theorem_says(call, path
     assert "0/0/7" in answer.out
 
 
-def test_both_methods_give_the_same_forces(call, path):
-    one = call("march", path, "--json").document
-    two = call("march", path, "--method", "monolithic", "--json").document
+def test_both_methods_give_the_same_forces(call, path, document):
+    one, two = document, call("march", path, "--method", "monolithic", "--json").document
     assert (one["method"], two["method"]) == ("iteration", "monolithic")
     for a, b in zip(one["increments"], two["increments"], strict=True):
         assert a["force"]["normal"] == pytest.approx(b["force"]["normal"], rel=1e-7, abs=1e-6)
@@ -53,8 +70,8 @@ def test_both_methods_give_the_same_forces(call, path):
 
 
 @pytest.mark.parametrize("words", [["--theta", "0.6"], ["--relaxation", "newton"]])
-def test_another_theta_or_rule_gives_the_same_forces_in_other_steps(call, path, words):
-    one, two = (call("march", path, "--json", *given).document for given in ([], words))
+def test_another_theta_or_rule_gives_the_same_forces_in_other_steps(call, path, document, words):
+    one, two = document, call("march", path, "--json", *words).document
     assert [i["iterations"] for i in one["increments"]] != [i["iterations"] for i in two["increments"]]
     for a, b in zip(one["increments"], two["increments"], strict=True):
         assert a["force"]["normal"] == pytest.approx(b["force"]["normal"], rel=1e-6, abs=1e-6)
@@ -75,13 +92,12 @@ def test_the_folder_holds_tables_views_and_a_series_for_paraview(path, written):
     assert vf.load(written / "problem.toml") == vf.load(path)
 
 
-def test_a_shorter_history_leaves_no_field_of_a_longer_one(call, path, quick, tmp_path):
-    data = pressed_and_sheared({"press": (2, [0, "-0.01"])})
-    (short := tmp_path / "short.toml").write_text(vf.Problem.from_dict(data).to_toml())
-    folder = tmp_path / "results"
-    assert call("march", path, "-o", folder).status == 0
-    assert call("march", short, "-o", folder).status == 0
-    assert len(list(folder.glob("body1-*.vtu"))) == 2
+def test_a_shorter_history_leaves_no_field_of_a_longer_one(call, short, quick, tmp_path):
+    folder, text = tmp_path / "results", short.read_text()
+    for increments in (3, 2):
+        short.write_text(text.replace("increments = 2", f"increments = {increments}"))
+        assert call("march", short, "-o", folder).status == 0
+        assert len(list(folder.glob("body1-*.vtu"))) == increments
 
 
 def test_a_field_of_another_program_is_not_overwritten(call, path, tmp_path):
@@ -141,25 +157,24 @@ def test_ctrl_c_shows_and_writes_the_increments_that_are_done(call, path, quick,
     assert json.loads((tmp_path / "kept" / "history.json").read_text()) == answer.document
 
 
-def test_ctrl_c_after_the_last_increment_keeps_all_of_them(call, path, monkeypatch):
+def test_ctrl_c_after_the_last_increment_keeps_all_of_them(call, short, monkeypatch):
     def linearise(self):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(vf.History, "linearise", linearise)
-    answer = call("march", path, "--json")
+    answer = call("march", short, "--json")
     assert answer.status == 130
-    assert len(answer.document["increments"]) == 30
+    assert len(answer.document["increments"]) == 2
     assert "interrupted after the last increment" in answer.err
 
 
-@pytest.mark.parametrize("view", ["loop", "states", "shear"])
-def test_every_view_is_drawn_of_both_methods_and_an_unknown_one_is_refused(path, view):
-    found = vf.march(path, method="monolithic")
-    assert found.plot(view).axes
+def test_every_view_is_drawn_of_the_global_method_too_and_an_unknown_one_is_refused(monolithic):
+    assert monolithic.plot("loop").axes
+    assert monolithic.plot("states").axes
     with pytest.raises(ValueError, match="loop, states, shear"):
-        found.plot("loops")
+        monolithic.plot("loops")
 
 
-def test_shear_is_drawn_at_the_times_asked_for(path):
-    figure = vf.march(path).plot("shear", times=[1, 2.5])
+def test_shear_is_drawn_at_the_times_asked_for(monolithic):
+    figure = monolithic.plot("shear", times=[1, 2.5])
     assert [ax.get_title(loc="left") for ax in figure.axes] == ["time 1, step press", "time 2.5, step back"]

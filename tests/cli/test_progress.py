@@ -1,7 +1,6 @@
 """A command that takes its time says what it is doing: on a terminal, and to whoever asks from Python."""
 
 import pytest
-from processes import UNDRAWN, on_a_terminal
 
 import verification as vf
 
@@ -33,10 +32,3 @@ def test_constants_name_the_mesh_that_is_measured(write):
     told = []
     vf.measure(vf.load(write()), refine=2, progress=lambda what, share: told.append(what))
     assert told == ["measuring the constants", *(f"measuring the constants, {i} of 2 halvings" for i in (1, 2))]
-
-
-def test_a_terminal_shows_what_compare_is_doing(write, tmp_path):
-    shown = on_a_terminal("compare", write("without friction"), "-o", tmp_path / "results", code=UNDRAWN)
-    found = [shown.find(stage) for stage in [*STAGES, "drawing and writing"]]
-    assert -1 not in found
-    assert found == sorted(found)

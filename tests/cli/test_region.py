@@ -55,6 +55,9 @@ def test_region_writes_a_picture_with_both_axes_every_edition_and_every_outcome(
     assert all(f"{name}: k < " in text for name in ("printed (MPa)", "repaired", "energy", "lmi"))
     words = lambda outcome: "run still falling when stopped" if outcome == "limit" else f"run {outcome}"
     assert all(words(outcome) in text for outcome in {point.outcome for point in charted[2].points})
+    first = (tmp_path / "plane.svg").read_bytes()
+    assert region("-o", tmp_path / "plane.svg").status == 0  # over its own picture
+    assert (tmp_path / "plane.svg").read_bytes() == first
     assert region("-o", tmp_path / "plane.png").status == 0
     assert (tmp_path / "plane.png").read_bytes().startswith(b"\x89PNG")
     assert b"Software\x00ndtheory" in (tmp_path / "plane.png").read_bytes()
@@ -66,16 +69,6 @@ def test_region_is_about_the_exchanged_roles_where_they_were_asked_for(call, cha
     for words in ((), ("--swap-roles",)):
         assert call("region", charted[0], "-o", tmp_path / "plane.svg", *words).status == 0
     assert [problem.iteration.neumann_body for problem in asked] == [2, 1]
-
-
-@pytest.mark.parametrize("ending", ["svg", *["png"] * AT_NIGHT])
-def test_region_writes_the_same_over_its_own_picture(region, tmp_path, ending):
-    first = []
-    for _ in range(2):
-        assert region("-o", tmp_path / f"plane.{ending}").status == 0
-        first.append((tmp_path / f"plane.{ending}").read_bytes())
-    assert first[0] == first[1]
-    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_the_screen_of_region_counts_runs_and_gives_each_edition_its_line(region, quick, charted, tmp_path):
@@ -116,12 +109,14 @@ def ends(region, every=1):
             yield k, low + share * (high - low)
 
 
-def test_what_the_printed_theorem_contracts_the_repaired_one_does_where_m_is_at_least_1(charted):
+def test_what_a_theorem_contracts_the_next_one_does_where_m_is_at_least_1(charted):
     """In MPa, that is; with m below 1 the printed threshold is the larger one."""
     _, measured, drawn, _ = charted
     assert measured.m.value >= 1
     for k, theta in ends(drawn.regions["printed"], every=9):
         assert evaluate(REPAIRED, measured.with_friction(k).constants(), theta).verdict == "contraction"
+    for k, theta in ends(drawn.regions["repaired"], every=9):
+        assert evaluate_energy(measured.with_friction(k).energy_constants(), theta).verdict == "contraction"
 
 
 def test_below_m_equal_to_1_the_printed_region_is_not_inside_the_repaired_one(write):
@@ -129,12 +124,6 @@ def test_below_m_equal_to_1_the_printed_region_is_not_inside_the_repaired_one(wr
     constants = measured.constants()
     assert measured.m.value < 1
     assert evaluate(PRINTED, constants).C2.value > evaluate(REPAIRED, constants).C2.value
-
-
-def test_what_the_repaired_theorem_contracts_the_one_in_energy_norms_does(charted):
-    _, measured, drawn, _ = charted
-    for k, theta in ends(drawn.regions["repaired"], every=9):
-        assert evaluate_energy(measured.with_friction(k).energy_constants(), theta).verdict == "contraction"
 
 
 def test_what_the_theorem_in_energy_norms_contracts_the_semidefinite_bound_does(charted):
@@ -156,7 +145,7 @@ def test_a_border_is_off_by_at_most_1_percent_between_its_frictions_too(write, n
     for name, bound in BOUNDS.items():
         region = bound.region(subject)
         line = lambda k, end, region=region: np.interp(k, region.k, [ends[end] for ends in region.theta])
-        for k in region.k[-1] * random.uniform(0.001, 1, 8 if name == "lmi" else 60):
+        for k in region.k[-1] * random.uniform(0.001, 1, (8 if name == "lmi" else 60) if AT_NIGHT else 4):
             if name == "lmi":
                 ends = (0.0, QuadraticForms(pair, measured, friction=k).largest_theta().value)
             else:
@@ -210,6 +199,7 @@ def test_no_run_inside_a_proved_region_stalls_or_runs_away(charted):
         ("held tangentially", "plane.svg", ["problem.toml", "held tangentially"]),
         ("without friction", "plane.svg", ["problem.toml", "contact.radius", "law of friction"]),
         ({"body1.young": "-1"}, "plane.svg", ["problem.toml", "body1.young", "-1"]),
+        ({"body2.prescribed": '{ top = ["free", -1] }'}, "plane.svg", ["body2: no region is proved: C_t1 is infinite"]),
     ],
     ids=str,
 )
@@ -233,13 +223,6 @@ def test_region_refuses_two_bars(call, write, tmp_path):
     complaint = call("region", write(text=examples()["two-bars"]), "-o", tmp_path / "plane.svg").complaint
     assert "problem.toml" in complaint
     assert "friction" in complaint
-
-
-def test_region_refuses_a_contact_body_that_can_slide(call, write, tmp_path):
-    complaint = call(
-        "region", write({"body2.prescribed": '{ top = ["free", -0.015] }'}), "-o", tmp_path / "plane.svg"
-    ).complaint
-    assert "body2: no region is proved: C_t1 is infinite" in complaint
 
 
 def test_region_needs_the_name_of_a_picture(call, write):

@@ -14,7 +14,7 @@ COMMANDS = {"constants": [], "run": [], "compare": [], "solve": [], "advise": []
 # --- --set ---
 
 
-@pytest.mark.parametrize("command", ["constants", "run", "compare", "solve", "advise"])
+@pytest.mark.parametrize("command", ["compare", "solve", "advise"])
 def test_a_key_set_is_a_key_of_the_file(call, write, command):
     edits = {"contact.friction": '"1/3"', "body2.prescribed": '{ top = ["free", -0.02], left = [0.0, "free"] }'}
     edits |= {"body1.cells": "[5, 1]", "body2.cells": "[3, 1]", "contact.interval": "[0.8, 1.6]"}
@@ -57,30 +57,23 @@ def test_other_options_count_more_than_keys_set(call, write):
     [
         ("contact.fricton=0.4", ["problem.toml: contact.fricton: unknown key", "friction"]),
         ("contact.friction=-1", ["problem.toml: contact.friction = -1: needed a number >= 0"]),
-        ("contact.friction.x=1", ["problem.toml: contact.friction.x", "no table"]),
-        ("contact.friction=", ["problem.toml: contact.friction", "needed a value"]),
         ("contact=1", ["problem.toml: contact = 1: needed a table"]),
         ("body1.cells=[40, 6", ["problem.toml: body1.cells", "[40, 6", "not a TOML value"]),
-        ("body1.cells=[40]", ["problem.toml: body1.cells", "two whole numbers >= 1"]),
-        ("body1.mesh=body.msh", ["problem.toml: body1.shape", "not both"]),
-        ("a b=1", ["problem.toml: a b: needed the name of a key"]),
         ("=1", ["problem.toml", "the name of a key"]),
         ("contact.friction", ["--set", "'contact.friction'", "KEY=VALUE, as contact.friction=0.4"]),
         ("", ["--set", "''", "KEY=VALUE"]),
         ("a\x1b[2J", ["--set", "KEY=VALUE"]),
-        ("x" * 5000, ["--set"]),
         ("x" * 5000 + "=1", ["problem.toml: xxx", "unknown key"]),
-        ("contact.friction=" + "9" * 5000, ["contact.friction", "a number >= 0"]),
     ],
     ids=lambda v: str(v)[:24],
 )
-@pytest.mark.parametrize("command", COMMANDS)
-def test_what_cannot_be_set_is_refused_in_one_short_line(call, write, tmp_path, command, typed, fragments):
+def test_what_cannot_be_set_is_refused_in_one_short_line(call, write, tmp_path, typed, fragments):
     file = write()
-    line = call(command, file, *(tmp_path / w if w.endswith("svg") else w for w in COMMANDS[command]), "--set", typed)
-    assert [f for f in fragments if f not in line.complaint] == []
-    assert line.complaint.isprintable()
-    assert len(line.complaint.replace(str(tmp_path), "")) < 700
+    for command, more in COMMANDS.items() if typed == "contact=1" else [("run", [])]:
+        line = call(command, file, *more, "--set", typed)
+        assert [f for f in fragments if f not in line.complaint] == []
+        assert line.complaint.isprintable()
+        assert len(line.complaint.replace(str(tmp_path), "")) < 700
 
 
 def test_a_key_is_set_in_a_file_alone(call):
@@ -106,8 +99,7 @@ def test_the_file_is_left_as_it_was(call, write):
 # --- --relaxation ---
 
 
-@pytest.mark.parametrize("command", ["run", "compare"])
-@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize(("command", "rule"), [*(("run", rule) for rule in RULES), ("compare", "newton")])
 def test_a_rule_of_the_call_is_a_rule_of_the_file(call, write, command, rule):
     without = {"contact.friction": "0", "iteration.theta": '"auto"', "body1.cells": "[5, 1]", "body2.cells": "[3, 1]"}
     expected = call(command, write(without | {"iteration.relaxation": f'"{rule}"'}), "--json")

@@ -29,7 +29,7 @@ def builder():
         sys.path.remove(str(DOCS))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def page(builder, tmp_path_factory):
     """A page with all widgets and nothing else."""
     folder = tmp_path_factory.mktemp("widgets")

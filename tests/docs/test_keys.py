@@ -17,12 +17,17 @@ import meshio
 import numpy as np
 import pytest
 from coupling_logs import linear_run, precice
+from known import DEAR, once, repeated_once
 from made_up import Halfway
+from shared import Shared
 
 import verification as vf
-from verification import figures, schemas
-from verification.certificate.continuum import certify_continuum
+from verification import comparison, figures, schemas
+from verification.certificate import continuum
 from verification.cli import main
+from verification.exploration import page
+from verification.ledger import Evidence
+from verification.ledger.sources import SOURCES
 from verification.registry import BOUNDS
 from verification.reproduce import READINGS, reproduce
 from verification.sweeps import region as plane
@@ -118,14 +123,23 @@ class Reader:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def sketched() -> Iterator[None]:
-    """Pictures that cost nothing and few runs in the plane: no key depends on them."""
+def sketched(shared: Shared, evidence: Callable[[str], Any]) -> Iterator[None]:
+    """Pictures that cost nothing and few runs in the plane, as no key depends on them; what is dear is shared."""
+    searched, bounded = "inequalities on random problems", continuum.bounded
+    found: dict[str, list[Evidence]] = evidence(searched)[0]
+
     with pytest.MonkeyPatch.context() as patch:
+        for module, name in DEAR:
+            patch.setattr(module, name, once(getattr(module, name), shared))
+        patch.setattr(comparison, "by_cvxpy_alone", repeated_once(comparison.by_cvxpy_alone, shared))
+        patch.setattr(continuum, "bounded", lambda model: shared(("continuum", model), lambda: bounded(model)))
+        patch.setitem(SOURCES, searched, lambda ids, *_: {id: found[id] for id in ids if id in found})
         for name in ("draw_bodies", "draw_residuals", "draw_waterfall", "draw_region"):
             patch.setattr(figures, name, lambda *args, **options: None)
         patch.setattr(figures, "save", lambda figure, path: path.write_bytes(b""))
         patch.setattr(plane, "THETAS", (0.2, 0.6))
         patch.setattr(plane, "FRICTIONS", (0.1, 0.9))
+        patch.setattr(page, "SHARES", page.SHARES[1:3])
         yield
 
 
@@ -284,7 +298,10 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         *certified(
             small, vf.Problem.from_dict({**small.to_dict(), "body2": {**small.to_dict()["body2"], "cells": [5, 2]}})
         ),
-        *(certify_continuum(problem) for problem in (small, small.swapped(), small.changed(theta="auto", friction=0))),
+        *(
+            continuum.certify_continuum(problem)
+            for problem in (small, small.swapped(), small.changed(theta="auto", friction=0))
+        ),
     ]
     return [*(result.to_dict() for result in results), *registered(small)]
 

@@ -184,14 +184,12 @@ def unknown_names(page: str) -> list[str]:
         lines = (line for line in code.splitlines() if not line.startswith("%"))
         nodes = list(ast.walk(ast.parse("\n".join(lines))))
         for node in nodes:
-            if isinstance(node, (ast.Import, ast.ImportFrom)):
-                known |= {(alias.asname or alias.name).partition(".")[0] for alias in node.names}
-            elif isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            if isinstance(node, ast.alias):
+                known.add((node.asname or node.name).partition(".")[0])
+            elif isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.ExceptHandler)):
                 known.add(node.name)
             elif isinstance(node, ast.arg):
                 known.add(node.arg)
-            elif isinstance(node, ast.ExceptHandler) and node.name:
-                known.add(node.name)
             elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
                 known.add(node.id)
         unknown += sorted({node.id for node in nodes if isinstance(node, ast.Name)} - known)

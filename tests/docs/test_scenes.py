@@ -22,6 +22,9 @@ from verification.registry import BOUNDS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
+#: Bounds of the plates are worked out once, for the page and for the tests of it.
+pytestmark = pytest.mark.usefixtures("known_bounds")
+
 #: The pages whose widget is made of scenes.
 SCENES = sorted(path.stem for path in (DOCS / "builder" / "questions").glob("[!_]*.py"))
 
@@ -247,7 +250,7 @@ def test_runs_and_proofs_of_the_plane_of_dots_are_those_of_the_library(builder, 
     problem = vf.example("section6").changed(cells=((20, 3), (12, 3)))
     problem = problem.swapped() if swapped else problem
     subject = Subject.of(vf.build(problem), vf.measure(problem))
-    for k, row in [(1, 5), (2, 9), (3, 7), (4, 3), (4, 4), (5, 1)]:
+    for k, row in [(1, 5), (2, 9), (4, 3), (5, 1)]:
         scene = data["scenes"][f"{int(swapped)},{k}"]
         friction = data["sliders"][1]["values"][k]
         theta, proved, q, outcome, rate = scene["rows"][row]

@@ -207,18 +207,14 @@ SAID = [
 def small(site_tools, builder, tmp_path_factory):
     """A small site with decks."""
     folder = tmp_path_factory.mktemp("slides")
-    builder.widgets.write(folder / "own")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(builder.widgets, "WIDGETS", {"cobweb": builder.widgets.WIDGETS["cobweb"]})
+        builder.widgets.write(folder / "own")
     static, own = str(DOCS / "slides"), str(folder / "own")
     conf = CONF.format(docs=str(DOCS), static=static, own=own, widgets=[str(DOCS / "widgets")])
     dot = '<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1"/>'
-    files = {
-        "conf.py": conf,
-        "index.md": PLAN,
-        "first.md": FIRST,
-        "second.md": SECOND,
-        "dot.svg": dot,
-        "mathjax.js": "",
-    }
+    files = {"conf.py": conf, "index.md": PLAN, "first.md": FIRST, "second.md": SECOND, "dot.svg": dot}
+    files["mathjax.js"] = ""
     for path, text in files.items():
         (folder / path).write_text(text, encoding="utf-8")
     assert sites(folder) == f"{folder.name} 0\n"

@@ -12,7 +12,7 @@ from safeguards.mission import EQUIVALENT, MISSION
 from strategies import AT_NIGHT
 
 
-@pytest.mark.parametrize("module", MISSION)
+@pytest.mark.parametrize("module", MISSION if AT_NIGHT else [*MISSION][::6])
 def test_ten_changes_of_one_place_are_drawn_from_the_text_of_each_module(module):
     source = (ROOT / module).read_text("utf-8")
     found = drawn(module, source)
@@ -83,9 +83,11 @@ def test_tests_that_fail_without_a_mutant_are_an_error_and_those_that_take_too_l
     monkeypatch.setitem(MISSION, "small.py", ("test_small.py",))
     (tmp_path / "small.py").write_text("SPARE = 7\n")
     (tmp_path / "test_small.py").write_text("def test():\n    assert False\n")
+    assert status(tmp_path, ["test_small.py"], 0.01) is None
+    if not AT_NIGHT:  # by night the tests of a copy run in a process of their own
+        monkeypatch.setattr(program, "status", lambda folder, tests, seconds=None: 1)
     with pytest.raises(RuntimeError, match=r"test_small\.py: do not pass without a mutant"):
         survivors("small.py", tmp_path)
-    assert status(tmp_path, ["test_small.py"], 0.01) is None
 
 
 def test_the_table_has_a_row_of_each_module_that_was_tried_and_their_sums():

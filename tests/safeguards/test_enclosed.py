@@ -19,10 +19,10 @@ def inside(found: Enclosed, exact) -> bool:
     return bool((abs(F(found.middle) - exact) <= F(found.radius)).all())
 
 
-def test_gamma_is_not_below_n_u_over_1_minus_n_u():
+def test_gamma_is_n_u_over_1_minus_n_u_rounded_upwards():
     u = Fraction(UNIT)
     for n in [*range(1, 3000), *(2**i + j for i in range(12, 30) for j in (-1, 0, 1))]:
-        assert Fraction(gamma(n)) >= n * u / (1 - n * u)
+        assert n * u / (1 - n * u) <= Fraction(gamma(n)) < n * u / (1 - n * u) * (1 + Fraction(1, 10**14))
 
 
 def test_upwards_is_not_below_a_sum_whose_terms_are_lost_or_underflow():

@@ -21,35 +21,25 @@ from ndtheory import PRINTED, REPAIRED, Constants, bounds, evaluate
 @in_both_editions
 @given(data=st.data())
 def test_every_field_agrees_with_the_formulas_of_the_paper(edition, data):
+    """With and without theta, and what is null in the JSON has a reason and nothing else has one."""
     constants, theta = data.draw(strategies.theory_cases(edition.name))
     assert differences(edition, constants, theta) == []
+    without, found = (evaluate(edition, Constants(**constants), t) for t in (None, theta))
+    assert without == replace(found, theta=None, factor=None, one_minus_factor=None, verdict=None)
+    document = json.loads(json.dumps(found.to_dict()))
+    assert {name for name, value in document.items() if value is None} == set(document["reason"])
 
 
 @in_both_editions
 @given(data=st.data())
-def test_proposition_5_6_is_the_statement_that_K_is_below_1(edition, data):
+def test_contraction_is_K_below_1_or_max_0_C6_below_theta_below_C1_and_friction_below_C2(edition, data):
+    """By Proposition 5.6, wording by wording."""
     constants, theta = data.draw(strategies.theory_cases(edition.name, thinnest=0))
     paper = oracle.EDITIONS[edition.name](**constants)
-    assert paper.contracts(theta) == (paper.K(theta) < 1)
-
-
-@in_both_editions
-@given(data=st.data())
-def test_contraction_is_max_0_C6_below_theta_below_C1_and_friction_below_C2(edition, data):
-    constants, theta = data.draw(strategies.theory_cases(edition.name))
-    paper = oracle.EDITIONS[edition.name](**constants)
-    inside = max(0, paper.C6 or 0) < oracle.real(theta) < paper.C1 and oracle.real(constants["C_K"]) < paper.threshold(
-        "C2"
-    )
+    friction_below = oracle.real(constants["C_K"]) < paper.threshold("C2")
+    inside = friction_below and max(0, paper.C6 or 0) < oracle.real(theta) < paper.C1
+    assert paper.contracts(theta) == (paper.K(theta) < 1) == inside
     assert evaluate(edition, Constants(**constants), theta).verdict == ("contraction" if inside else "no conclusion")
-
-
-@in_both_editions
-@given(data=st.data())
-def test_the_interval_is_there_with_and_without_theta(edition, data):
-    constants, theta = data.draw(strategies.theory_cases(edition.name))
-    without, with_theta = (evaluate(edition, Constants(**constants), t) for t in (None, theta))
-    assert without == replace(with_theta, theta=None, factor=None, one_minus_factor=None, verdict=None)
 
 
 @given(strategies.constants())
@@ -93,59 +83,29 @@ def test_the_formulas_hold_in_plain_floats(edition, data):
 @in_both_editions
 @given(data=st.data())
 def test_a_b_a_prime_and_b_prime_are_exactly_those_of_the_paper(edition, data):
+    """And a >= 1, b <= -2, C1 <= 1; h1 meets h2 at C0 and is the larger above it; C5 is C2; C0 < C1 below C2 alone."""
     constants = data.draw(strategies.square_constants(edition.name))
     theta = data.draw(strategies.thetas())
     (x, m, M, C_R), u = read(edition, constants)
     P, D, Q = bounds.P(x, m, M, C_R, u), bounds.D(x, m, M, C_R, u), bounds.Q(x, m, M, C_R)
-    C_T = bounds.lipschitz(m, M, C_R, x)
+    C_T, C0, C1 = bounds.lipschitz(m, M, C_R, x), bounds.C0(m, M, C_R), bounds.C1(D, Q)
+    gain_1, gain_2 = (lambda t: bounds.one_minus_h1(t, D, Q)), (lambda t: bounds.one_minus_h2(t, P))
     bracket = (x * C_T / (M * C_R) / u + x / m**2) * M**2 / m
     a = C_T**2 * M**2 / m**2 + 2 * C_T**2 / C_R**2 - 2 * bracket + 1
     b = -2 * C_T**2 / C_R**2 + 2 * bracket - 2
     a_prime = 1 - 2 * bracket
     assert (bracket, a, b) == (P, 1 + 2 * D + Q, -2 * (1 + D))
-    assert bounds.C1(D, Q) == -b / a
-    assert bounds.one_minus_h1(theta, D, Q) == 1 - (a * theta**2 + b * theta + 1)
-    assert bounds.one_minus_h2(theta, P) == 1 - (a_prime * theta**2 - (1 + a_prime) * theta + 1)
+    assert C1 == -b / a <= 1 <= a
+    assert b <= -2
+    assert gain_1(theta) == 1 - (a * theta**2 + b * theta + 1)
+    assert gain_2(theta) == 1 - (a_prime * theta**2 - (1 + a_prime) * theta + 1)
     assert a_prime == 0 or bounds.C6(P) == 1 + 1 / a_prime
-
-
-@in_both_editions
-@given(data=st.data())
-def test_a_is_at_least_1_b_at_most_minus_2_and_C1_at_most_1(edition, data):
-    (x, m, M, C_R), u = read(edition, data.draw(strategies.square_constants(edition.name)))
-    D, Q = bounds.D(x, m, M, C_R, u), bounds.Q(x, m, M, C_R)
-    assert 1 + 2 * D + Q >= 1
-    assert -2 * (1 + D) <= -2
-    assert bounds.C1(D, Q) <= 1
-    assert 0 < bounds.C0(m, M, C_R) <= F(2, 3)
-
-
-@in_both_editions
-@given(data=st.data())
-def test_h1_meets_h2_at_C0_and_is_the_larger_above_it(edition, data):
-    (x, m, M, C_R), u = read(edition, data.draw(strategies.square_constants(edition.name)))
-    theta = data.draw(strategies.thetas())
-    P, D, Q = bounds.P(x, m, M, C_R, u), bounds.D(x, m, M, C_R, u), bounds.Q(x, m, M, C_R)
-    C0 = bounds.C0(m, M, C_R)
-    assert bounds.one_minus_h1(C0, D, Q) == bounds.one_minus_h2(C0, P)
-    assert (bounds.one_minus_h1(theta, D, Q) <= bounds.one_minus_h2(theta, P)) == (theta >= C0)
-
-
-@in_both_editions
-@given(data=st.data())
-def test_C5_is_C2(edition, data):
-    (_, m, M, C_R), _ = read(edition, data.draw(strategies.square_constants(edition.name)))
-    C0 = bounds.C0(m, M, C_R)
-    assert m**5 / (M * C_R) ** 2 + m**3 == (2 - C0) / (1 - C0) * m**3 / 2
-
-
-@in_both_editions
-@given(data=st.data())
-def test_C0_is_below_C1_exactly_when_friction_is_below_C2(edition, data):
-    (x, m, M, C_R), u = read(edition, data.draw(strategies.square_constants(edition.name)))
-    C1 = bounds.C1(bounds.D(x, m, M, C_R, u), bounds.Q(x, m, M, C_R))
-    below = bounds.G(x, m, M, C_R, u) < m**5 / (M * C_R) ** 2 + m**3
-    assert (bounds.C0(m, M, C_R) < C1) == below
+    assert 0 < C0 <= F(2, 3)
+    assert gain_1(C0) == gain_2(C0)
+    assert (gain_1(theta) <= gain_2(theta)) == (theta >= C0)
+    of_C2 = m**5 / (M * C_R) ** 2 + m**3
+    assert of_C2 == (2 - C0) / (1 - C0) * m**3 / 2
+    assert (C0 < C1) == (bounds.G(x, m, M, C_R, u) < of_C2)
 
 
 @in_both_editions
@@ -265,15 +225,6 @@ def test_a_body_whose_contact_stress_or_trace_vanishes_bears_any_friction(editio
     found = evaluate(edition, Constants(m=1, M=2, C_R=1, C_s=C_s, C_tr=C_tr, k=1000), "1/10")
     assert found.verdict == "contraction"
     assert [getattr(found, name) for name in THRESHOLDS] == [None] * 4
-
-
-@in_both_editions
-@given(data=st.data())
-def test_what_is_null_in_the_json_has_a_reason_and_nothing_else_has_one(edition, data):
-    constants, theta = data.draw(strategies.theory_cases(edition.name))
-    document = json.loads(json.dumps(evaluate(edition, Constants(**constants), theta).to_dict()))
-    null = {name for name, value in document.items() if value is None}
-    assert null == set(document["reason"])
 
 
 # --- the comparison is alive ---------------------------------------------------------------------------------------

@@ -38,39 +38,16 @@ pytestmark = pytest.mark.usefixtures("many_digits")
 
 @strategies.fewer(2)
 @given(cases())
-def test_every_field_agrees_with_a_search_for_the_worst_case(case):
-    assert differences(*case) == []
-
-
-@strategies.fewer(2)
-@given(cases())
-def test_every_formula_agrees_with_a_search_for_the_worst_case(case):
-    assert formula_differences(*case) == []
-
-
-@strategies.fewer(2, at_night=1)
-@given(cases())
-def test_a_factor_is_reported_exactly_where_the_worst_case_shrinks(case):
+def test_every_field_and_formula_agrees_with_a_search_for_the_worst_case(case):
+    """A factor is reported where the worst case shrinks, below 1 by no less at the best theta, which needs no theta."""
     constants, theta = case
-    found = evaluate_energy(EnergyConstants(**constants), theta)
+    assert differences(*case) == []
+    assert formula_differences(*case) == []
+    without, found = (evaluate_energy(EnergyConstants(**constants), t) for t in (None, theta))
     contracts = energy(**constants).contracts(oracle.real(theta))
     assert found.verdict == ("contraction" if contracts else "no conclusion")
     assert (found.factor is not None) == (found.one_minus_factor is not None) == contracts
-
-
-@strategies.fewer(2, at_night=1)
-@given(cases())
-def test_the_interval_and_the_best_theta_do_not_depend_on_the_theta_given(case):
-    constants, theta = case
-    without, with_theta = (evaluate_energy(EnergyConstants(**constants), t) for t in (None, theta))
-    assert without == replace(with_theta, theta=None, factor=None, one_minus_factor=None, verdict=None)
-
-
-@strategies.fewer(2, at_night=1)
-@given(cases())
-def test_no_theta_has_a_smaller_factor_than_the_one_called_best(case):
-    constants, theta = case
-    found = evaluate_energy(EnergyConstants(**constants), theta)
+    assert without == replace(found, theta=None, factor=None, one_minus_factor=None, verdict=None)
     assert found.factor is None or found.factor_proved.value <= found.factor.value
     assert found.interval is None or found.interval[0] < found.theta_proved <= found.interval[1]
 
@@ -86,30 +63,17 @@ def test_r_is_the_positive_root_and_there_the_work_is_minus_sqrt_rho_r(numbers):
     assert energy_norms.work(ratio, kappa_1, kappa_2) == -root * ratio
 
 
-@given(rational_ratios(), strategies.thetas())
-def test_q_is_the_larger_of_both_ends_and_the_vertex_in_exact_rationals(numbers, theta):
+@given(rational_ratios(), strategies.thetas(), SHARES)
+def test_q_is_the_larger_of_both_ends_and_the_vertex_in_exact_rationals(numbers, theta, share):
+    """No x between 0 and r exceeds it; at r it is the distance of theta (1 + sqrt(rho) r) from 1."""
     root, kappa_1, kappa_2, ratio = numbers
     data = (root**2, kappa_1, kappa_2)
     quadratic = lambda x: right_side(x, theta, *data)
     worst, largest = summit(quadratic, ratio)
-    assert quadratic(worst) == largest
-    assert quadratic(energy_norms.worst_ratio(theta, *data)) == quadratic(worst)
-    assert 0 <= energy_norms.worst_ratio(theta, *data) <= ratio
-    assert energy_norms.square_at(worst, theta, *data) == quadratic(worst)
-    assert energy_norms.one_minus_square(theta, *data) == 1 - quadratic(worst)
-
-
-@given(rational_ratios(), strategies.thetas(), SHARES)
-def test_no_x_between_0_and_r_exceeds_q(numbers, theta, share):
-    root, kappa_1, kappa_2, ratio = numbers
-    data = (root**2, kappa_1, kappa_2)
-    assert right_side(share * ratio, theta, *data) <= 1 - energy_norms.one_minus_square(theta, *data)
-
-
-@given(rational_ratios(), strategies.thetas())
-def test_at_x_equal_to_r_q_is_the_distance_of_theta_times_1_plus_sqrt_rho_r_from_1(numbers, theta):
-    root, kappa_1, kappa_2, ratio = numbers
-    data = (root**2, kappa_1, kappa_2)
+    found, lost = energy_norms.worst_ratio(theta, *data), energy_norms.one_minus_square(theta, *data)
+    assert quadratic(worst) == quadratic(found) == largest == 1 - lost
+    assert 0 <= found <= ratio
+    assert energy_norms.square_at(worst, theta, *data) == largest >= quadratic(share * ratio)
     square = (1 - theta * (1 + root * ratio)) ** 2
     assert energy_norms.square_at(ratio, theta, *data) == square == 1 - energy_norms.one_minus_end(theta, *data)
 

@@ -13,17 +13,25 @@ from verification.sweeps import workers
 collect_ignore = [] if find_spec("KratosMultiphysics") else ["kratos_contact.py"]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def comparison():
     return vf.compare(problem())
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def written(comparison, tmp_path_factory):
     """A folder with everything in it."""
     folder = tmp_path_factory.mktemp("written")
     Folder(folder, "compare").write(comparison)
     return folder
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch):
+    """No process for each mesh file."""
+    from mesh_writer import read_here
+
+    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)
 
 
 @pytest.fixture

@@ -5,9 +5,12 @@ Nothing of the assembly, the condensation, the norms or the eigensolvers under t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, eigh
@@ -272,3 +275,30 @@ class DensePair:
 def rounding(*bodies: DenseBody, solves: int = 1) -> float:
     """1e-9, or on thin bodies what the condition of the stiffness matrix leaves of sixteen digits after some solves."""
     return max(1e-9, *(20 * solves * np.finfo(float).eps * np.linalg.cond(body.A) for body in bodies))
+
+
+# --- other units ------------------------------------------------------------------------------------------------------
+
+
+def close(found: Mapping[str, float], expected: Mapping[str, float], relative: float = 1e-9) -> None:
+    """Every expected value is met."""
+    off = {
+        name: (found[name], value)
+        for name, value in expected.items()
+        if not abs(found[name] - value) <= relative * abs(value)
+    }
+    assert off == {}, off
+
+
+def with_moduli(data: Mapping[str, Any], factor: Fraction) -> dict[str, Any]:
+    """Both moduli times a factor."""
+    return {**data, **{name: data[name] | {"young": data[name]["young"] * factor} for name in ("body1", "body2")}}
+
+
+def stretched(data: Mapping[str, Any], c: Fraction) -> dict[str, Any]:
+    """Every length times c."""
+    scale = lambda table, keys: {key: [c * v for v in table[key]] for key in keys if key in table}
+    other = {**data, **{name: data[name] | scale(data[name], ("x", "y")) for name in ("body1", "body2")}}
+    contact = data["contact"] | scale(data["contact"], ("interval",))
+    other["contact"] = contact | {key: c * contact[key] for key in ("radius", "gap") if key in contact}
+    return other

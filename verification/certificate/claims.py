@@ -30,6 +30,7 @@ from verification.interface.pair import ContactPair, pair_from
 from verification.machine.progress import Progress, silent
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
+from verification.semidefinite.conditions import times
 from verification.semidefinite.interior_point import Weights
 
 #: Shares by which 1 minus a factor is made smaller, until the multipliers prove it for the rational bodies.
@@ -52,6 +53,7 @@ LESS = (0.0, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2)
 #: Thetas at which a friction is tried that every small theta is to bear.
 SMALL = (Fraction(1, 10**3), Fraction(1, 10**6), Fraction(1, 10**9))
 
+PLANE = "needed a plane problem (dimension = 2): in 1D rho is a ratio of stiffnesses, which needs no proof"
 NOT_CONFIRMED = "gives 1 - {:.3g} in doubles, which is not confirmed in rationals"
 NOT_BELOW = f"is not confirmed in rationals, nor what is smaller by a share of {LESS[-1]:g}"
 
@@ -134,9 +136,7 @@ class Confirmation:
         if pair.problem is None:
             raise NoCertificate(FROM_MATRICES)
         if pair.problem.dimension != 2:
-            raise NoCertificate(
-                "needed a plane problem (dimension = 2): in 1D rho is a ratio of stiffnesses, which needs no proof"
-            )
+            raise NoCertificate(PLANE)
         if pair.outside:
             raise NoCertificate(f"outside the theorem: {pair.outside[0]}")
         if pair.contact.lifts:
@@ -173,7 +173,7 @@ class Confirmation:
         """
         for share in LESS:
             found = _decimal(theta * (1 - share), ROUND_DOWN)
-            if self._claims.accepted(found, Fraction(1), written(_times(float(found), multipliers))):
+            if self._claims.accepted(found, Fraction(1), written(times(float(found), multipliers))):
                 return found
         raise NoCertificate(f"theta = {theta:.6g} in doubles {NOT_BELOW}")
 
@@ -196,13 +196,9 @@ class Confirmation:
             )
             multipliers = propose(float(found))
             for theta in SMALL:
-                if claims.accepted(theta, Fraction(1), written(_times(float(theta), multipliers))):
+                if claims.accepted(theta, Fraction(1), written(times(float(theta), multipliers))):
                     return found
         raise NoCertificate(f"k = {k:.6g} in doubles {NOT_BELOW}")
-
-
-def _times(factor: float, multipliers: Weights) -> Weights:
-    return tuple(factor * values for values in multipliers)
 
 
 def written(multipliers: Weights, equal: Sequence[float] = ()) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
 from verification.bounds.table import certifying, strongest
 from verification.certificate import check
-from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, describe, same, written
+from verification.certificate.claims import NOT_CONFIRMED, PLANE, Claims, NoCertificate, describe, same, written
 from verification.constants import Measured, measure
 from verification.document import Document
 from verification.interface.pair import UNITS, ContactPair, pair_from
@@ -193,10 +193,7 @@ def certify(
     if exact and not BOUNDS[edition].divides:
         raise ValueError(f"edition {edition!r} with exact: needed one that divides the pieces of T")
     if problem.dimension != 2:
-        raise refuse(
-            "dimension",
-            "needed a plane problem (dimension = 2): in 1D rho is a ratio of stiffnesses, which needs no proof",
-        )
+        raise refuse("dimension", PLANE)
     pair = pair_from(problem)
     measured = measure(pair)
     if pair.outside:

@@ -28,24 +28,23 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
     """The advice from the options of ``advise matrices`` that were given, S1 among them, by parameter."""
     from verification.coupling.from_matrices import advise_matrices
     from verification.coupling.from_problems import advise
-    from verification.coupling.matrix_files import is_interface, names_in, read_matrix, read_vector
+    from verification.coupling.matrix_files import names_in, read_matrix, read_vector
+    from verification.interface.files import NEEDED
 
     context = click.get_current_context()
     S1, S2 = given["S1"], given.get("S2")
     options = {parameter.name: parameter.opts[0] for parameter in context.command.params}
     others = [option for name, option in options.items() if name in given and name not in ("S1", "S2")]
-    if S2 in (None, S1) and is_interface(S1):
+    held = set(names_in(S1)) if S2 in (None, S1) else set()
+    if set(NEEDED) <= held:
         if others:
             raise click.UsageError(f"received {others[0]} with {S1}: an interface file has all of it", context)
         return advise(S1, tied=tied, progress=tell)
-    if S2 is None:
-        held = names_in(S1)
-        if not {"S1", "S2"} <= set(held):
-            raise click.UsageError(f"{S1}: needed both --S1 and --S2, or one file with arrays S1 and S2", context)
-        S2 = S1
-    if S1 == S2 and set(names_in(S1)).intersection(("S1", "S2")) == {"S1"}:
+    if S2 is None and not {"S1", "S2"} <= held:
+        raise click.UsageError(f"{S1}: needed both --S1 and --S2, or one file with arrays S1 and S2", context)
+    if held & {"S1", "S2"} == {"S1"}:
         raise click.UsageError(f"{S1}: needed arrays S1 and S2 for --S2 as well, received S1 alone", context)
-    values: dict[str, Any] = {"S1": read_matrix(S1, "S1"), "S2": read_matrix(S2, "S2")}
+    values: dict[str, Any] = {"S1": read_matrix(S1, "S1"), "S2": read_matrix(S2 or S1, "S2")}
     reads = {"transfer": read_matrix, "kernel": read_matrix, "x": read_vector, "weights": read_vector}
     for name, read in reads.items():
         if name in given:
@@ -66,13 +65,13 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
 
 def _grids(transfer: Path, given: Mapping[str, Any]) -> dict[str, Any]:
     """The positions and weights of both grids, where the file of the transfer has them and no option gives them."""
-    from verification.coupling.matrix_files import names_in, read_array
+    from verification.coupling.matrix_files import names_in, read_vector
 
     held = set(names_in(transfer))
     wanted = {"x_neumann": "x_neumann", "x": "x_contact", "weights": "weights_contact"}
     if "radius" not in given:
         del wanted["x_neumann"]
-    return {name: read_array(transfer, of) for name, of in wanted.items() if of in held and name not in given}
+    return {name: read_vector(transfer, of) for name, of in wanted.items() if of in held and name not in given}
 
 
 TIED = click.option("--tied", is_flag=True, help="Nothing opens or slips: tied bodies, heat, a fluid at a wall.")
@@ -419,16 +418,13 @@ def vectors(iterates: Path, images: Path | None, tied: bool, snippets: str | Non
     context = click.get_current_context()
     _no_document_of(snippets, as_json)
     from verification.coupling.from_vectors import advise_vectors
-    from verification.coupling.matrix_files import names_in, read_array, read_matrix
+    from verification.coupling.matrix_files import names_in, read_matrix
 
-    if images is None:
-        if not {"X", "TX"} <= set(names_in(iterates)):
-            raise click.UsageError(f"{iterates}: needed X and TX, or one file with arrays X and TX", context)
-        given = [read_array(iterates, name) for name in ("X", "TX")]
-    else:
-        given = [read_matrix(iterates, "X"), read_matrix(images, "TX")]
+    if images is None and not {"X", "TX"} <= set(names_in(iterates)):
+        raise click.UsageError(f"{iterates}: needed X and TX, or one file with arrays X and TX", context)
+    X, TX = read_matrix(iterates, "X"), read_matrix(images or iterates, "TX")
     try:
-        found = advise_vectors(*given, tied=tied)
+        found = advise_vectors(X, TX, tied=tied)
     except ValueError as error:
         files = ", ".join(map(str, dict.fromkeys([iterates, images or iterates])))
         raise click.UsageError(f"{files}: {error}", context) from None

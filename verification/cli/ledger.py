@@ -50,9 +50,9 @@ def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path |
         return 0
     from verification.ledger import verify as check
     from verification.ledger.sections import sections
-    from verification.output.folder import Folder
+    from verification.output.folder import writer
 
-    write = None if folder is None else Folder(folder, "verify").write
+    write = writer(folder, "verify")
     try:
         with stages() as watch:
             found = check(chosen, level=level or "quick", watch=watch)
@@ -124,12 +124,12 @@ def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | 
       ndtheory reproduce fig5
       ndtheory reproduce all --jobs 2 -o section6
     """
-    from verification.output.folder import Folder
+    from verification.output.folder import writer
     from verification.reproduce import FIGURES
     from verification.reproduce import reproduce as run_again
     from verification.reproduce.sections import sections
 
-    write = None if folder is None else Folder(folder, "reproduce").write
+    write = writer(folder, "reproduce")
     with stages() as tell:
         found = run_again(FIGURES if figure == "all" else (figure,), jobs=jobs or -1, store=store, progress=tell)
     deliver(found, sections, as_json, write, folder)

@@ -43,10 +43,10 @@ def march(typed: Typed, solver: Any, method: Any, folder: Path | None, as_json: 
     problem = load(typed)
     from verification.algorithm import history
     from verification.algorithm.runs import Run
-    from verification.output.folder import Folder
+    from verification.output.folder import writer
     from verification.sections.history import sections
 
-    write = None if folder is None else Folder(folder, "march").write
+    write = writer(folder, "march")
     with stages() as tell:
 
         def watch(increment: Increment, planned: int) -> None:

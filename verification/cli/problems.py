@@ -174,10 +174,10 @@ def run(typed: Typed, solver: Any, start: Path | None, folder: Path | None, as_j
     from verification.algorithm.start import forces
     from verification.coupling.matrix_files import read_vector
     from verification.interface.pair import pair_from
-    from verification.output.folder import Folder
+    from verification.output.folder import writer
     from verification.sections.run import sections
 
-    write = None if folder is None else Folder(folder, "run").write
+    write = writer(folder, "run")
     pair = pair_from(problem)
     g = None if start is None else forces(read_vector(start), pair, str(start))
     warn(pair.warnings)
@@ -211,11 +211,11 @@ def solve(typed: Typed, folder: Path | None, as_json: bool) -> int:
     """
     from verification.algorithm import monolithic
     from verification.interface.assembly import discretise
-    from verification.output.folder import Folder
+    from verification.output.folder import writer
     from verification.sections import run
 
     problem = load(typed)
-    write = None if folder is None else Folder(folder, "solve").write
+    write = writer(folder, "solve")
     bodies = discretise(problem)
     warn(bodies.warnings)
     with stages() as tell:
@@ -306,11 +306,11 @@ def demo(folder: Path, as_json: bool) -> int:
 def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, **asked: Any) -> int:
     from verification import comparison as verdicts
     from verification.interface.pair import pair_from
-    from verification.output.folder import Folder
+    from verification.output.folder import writer
     from verification.sections.comparison import Parts
     from verification.sections.comparison import verdicts as end
 
-    write = None if folder is None else Folder(folder, "compare").write
+    write = writer(folder, "compare")
     pair = pair_from(problem)
     warn(pair.warnings)
     parts = None if as_json else Parts(pair, one_by_one(needed=write is not None))

@@ -14,6 +14,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from fem1d2d.mesh import Floats
 from ndtheory.keys import Part, key
 from ndtheory.keys import says as means
 from verification.coupling.log_files import Log
@@ -101,7 +102,7 @@ def seen_accelerated(log: Log) -> Accelerated:
 
 def seen_factors(log: Log) -> SeenFactors | None:
     """The ends that the factors of a log show; None where no factor counts."""
-    column, inverse, given, fall = log.columns[0], [], 0, 1.0
+    column, inverse, given, fall = log.columns[0], list[Floats](), 0, 1.0
     for residuals, factors in zip(column.windows, log.factors, strict=False):
         given += int(np.isfinite(factors).sum())
         finite = residuals[np.isfinite(residuals) & (residuals > 0)]
@@ -109,13 +110,12 @@ def seen_factors(log: Log) -> SeenFactors | None:
             continue
         fall = min(fall, float(finite[-1] / finite.max()))
         least = max(NOISE * float(finite.max()), 100 * column.decimals)
-        for i in range(1, len(factors)):  # the first one is the user's
-            if not np.isfinite(factors[i]) or factors[i] == 0 or not min(residuals[i - 1 : i + 1]) >= least:
-                continue
-            inverse.append(1 / float(factors[i]))
-    if not inverse:
+        after = factors[1:]  # the first one is the user's
+        counts = np.isfinite(after) & (after != 0) & (np.minimum(residuals[:-1], residuals[1:]) >= least)
+        inverse.append(1 / after[counts])
+    found, doubt = np.concatenate([*inverse, []]), ""
+    if not found.size:
         return None
-    found, doubt = np.array(inverse), ""
     if found.min() < 1 - BELOW:
         doubt = "factors above 1 or below 0: contact changes, or the solvers are not accurate enough"
     elif fall > FALLEN and len(found) < ENOUGH:

@@ -190,8 +190,6 @@ class Coupled(Value):
         What the Neumann body answered to it.
     history : tuple of float
         ``|Tg - g| / |Tg|`` of each evaluation.
-    spectrum : Spectrum or None
-        The eigenvalues as the vectors show them, ``low`` and ``high`` at its ends.
     advice : Advice or None
         For the next coupling of the same solvers; None where no two vectors differ.
     """
@@ -201,8 +199,12 @@ class Coupled(Value):
     force: Floats
     displacement: Floats
     history: tuple[float, ...]
-    spectrum: Spectrum | None
     advice: Advice | None
+
+    @property
+    def spectrum(self) -> Spectrum | None:
+        """The eigenvalues as the vectors show them, ``low`` and ``high`` at its ends."""
+        return None if self.advice is None else self.advice.spectrum
 
     @property
     def converged(self) -> bool:
@@ -298,7 +300,6 @@ def couple(
         force=seen[-1].g,
         displacement=displacement,
         history=tuple(each.relative for each in seen),
-        spectrum=coupling.spectrum,
         advice=coupling.advice,
     )
 

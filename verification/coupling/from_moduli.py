@@ -131,8 +131,7 @@ def _bodies(young: Sequence[Any], poisson: Sequence[Any], plane: Plane) -> tuple
     given = {}
     for key, pair, of in (("young", young, "E1,E2"), ("poisson", poisson, "nu1,nu2")):
         if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
-            received = pair if isinstance(pair, str) or not hasattr(pair, "__len__") else ",".join(map(str, pair))
-            raise HypothesisError(key, received, f"two numbers {of}, of body 1 and of body 2")
+            raise HypothesisError(key, shown(pair), f"two numbers {of}, of body 1 and of body 2")
         given[key] = pair
     needed = "numbers E > 0 (1e-24 to 1e24)"
     E = [take("young", v, needed, lambda v: Fraction(1, LARGEST_YOUNG) <= v <= LARGEST_YOUNG) for v in given["young"]]

@@ -89,7 +89,7 @@ def read_log(path: Path, pattern: str | None = None) -> Log:
     text = _ANSI.sub("", _text(path))
     if not text.strip():
         raise _refused(path, "needed residuals, this file is empty")
-    seconds = int(SECONDS + SECONDS_PER_CHARACTER * len(text))
+    seconds = SECONDS + int(SECONDS_PER_CHARACTER * len(text))
     form = form or form_of(text)
     try:
         with in_time(seconds) if pattern is not None else nullcontext():
@@ -130,16 +130,9 @@ def _quasi_newton_beside(path: Path) -> str | None:
     beside = path.with_name(path.name.replace("-convergence.log", "-iterations.log"))
     if beside == path or unreadable(beside, MOST_BYTES):
         return None
-    names, *lines = (line.split() for line in _text(beside).split("\n"))
-    if "QNColumns" not in names:
-        return None
-    i = names.index("QNColumns")
-    counts = [int(words[i]) for words in lines if len(words) == len(names) and words[i].isdigit()]
-    return _quasi_newton(max(counts, default=0))
-
-
-def _quasi_newton(columns: int) -> str | None:
-    return f"quasi-Newton, up to {columns} columns" if columns else None
+    with suppress(ProblemError):  # a log of constant relaxation has these counts, too
+        return _LogTable(beside, _text(beside)).log().accelerator
+    return None
 
 
 def _number(word: str) -> float:
@@ -351,7 +344,7 @@ class _LogTable:
                     path=self.path,
                     form="preCICE",
                     columns=(),
-                    accelerator=_quasi_newton(int(modes.max())),
+                    accelerator=f"quasi-Newton, up to {int(modes.max())} columns",
                     counts=tuple(int(count) for count in counts),
                 )
         iteration, window, theta, residuals = self._roles(names, data.shape[1])
@@ -368,16 +361,15 @@ class _LogTable:
                 raise _refused(self.path, f"needed a residual >= 0 in {names[i]}", self.numbers[wrong[0]], received)
             split = tuple(np.split(data[:, i], starts))
             columns.append(Column(name=names[i], residual=_kind(names[i]), windows=split, **_rounding(words[i])))
-        factors = None if theta is None else data[:, theta]
-        omega = theta is not None and factors is not None and "omega" in names[theta].lower()
-        changes = omega and factors is not None and bool((factors != factors[0]).any())
+        factors = np.empty(0) if theta is None else data[:, theta]
+        changes = theta is not None and "omega" in names[theta].lower() and bool((factors != factors[0]).any())
         return Log(
             path=self.path,
             form="preCICE" if any(_PRECICE.fullmatch(name) for name in names) else "columns",
             columns=tuple(columns),
-            theta=None if factors is None or changes else self._theta(factors),
+            theta=None if theta is None or changes else self._theta(factors),
             accelerator="Aitken" if changes else None,
-            factors=tuple(np.split(factors, starts)) if changes and factors is not None else (),
+            factors=tuple(np.split(factors, starts)) if changes else (),
             notes=tuple(self.notes),
         )
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from verification.coupling.advice import Advice
 from verification.coupling.readings import NextRun
-from verification.coupling.sections import next_run, of, pasted, pasted_for, which_body, which_method
+from verification.coupling.sections import next_run, of, pasted, pasted_for, reads, which_body, which_method
 from verification.coupling.seen_moduli import Corners, ElasticBodies, ModuliRole, excluded_from
 from verification.coupling.waves import Fluid, Heat, Waves
 from verification.show.numbers import figures, near_one
@@ -110,7 +110,8 @@ def _start(started: Sequence[ModuliRole], first: NextRun | None, parallel: bool)
 def _of_heat(seen: Heat, found: Advice) -> Iterator[Section]:
     names: Names = {1: "plate 1", 2: "plate 2"}
     yield _setting(seen)
-    said = _reads(found, names, "fluxes", "temperatures")
+    body = found.neumann_body or 2
+    said = reads(names[body], names[3 - body], "fluxes", "temperatures")
     same = found.no_difference and len({figures(role.rho_tied) for role in found.roles}) == 1
     yield which_body(said, *["It makes no difference with the roles exchanged."] * same)
     yield _theta_of_heat(found, seen, names)
@@ -127,7 +128,7 @@ def _of_fluid(seen: Fluid, found: Advice) -> Iterator[Section]:
     names: Names = {1: "the fluid", 2: "the wall"}
     yield _setting(seen)
     refused = f"With the roles exchanged: {found.roles[1].reason['rho']}."
-    yield which_body(_reads(found, names, "pressures", "displacements"), refused)
+    yield which_body(reads(names[2], names[1], "pressures"), refused)
     yield _bounds_of_fluid(found, seen)
     yield from _parallel(found, names)
     yield from which_method(found, names)
@@ -139,13 +140,6 @@ def _of_fluid(seen: Fluid, found: Advice) -> Iterator[Section]:
 def _setting(seen: Waves) -> Section:
     data = (f"{name} {', '.join(f'{float(v):.5g}' for v in values)}" for name, values in seen.given.items())
     return section("setting", "", Facts("", tuple(data)))
-
-
-def _reads(found: Advice, names: Names, forces: str, moves: str) -> str:
-    """The data that each solver reads and writes."""
-    body = found.neumann_body or 2
-    neumann, contact = names[body], names[3 - body]
-    return f"{neumann}'s solver reads {forces} and writes {moves}, {contact}'s the reverse.".capitalize()
 
 
 def _theta_of_heat(found: Advice, seen: Heat, names: Names) -> Section:

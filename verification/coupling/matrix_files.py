@@ -15,7 +15,6 @@ import scipy.sparse as sp
 from scipy.io.matlab import MatReadError
 
 from fem1d2d.mesh import Floats
-from verification.interface.files import NEEDED
 from verification.interface.matrices import MOST_ROWS, UNREADABLE, headers, real_array
 from verification.problem.tables import ProblemError, short, unreadable
 
@@ -44,7 +43,8 @@ def read_matrix(path: Path, name: str = "") -> Floats:
 
     ``.npy``; ``.npz`` (scipy.sparse.save_npz, or numpy.savez); ``.mtx`` (Matrix Market); ``.mat`` (MATLAB, not 7.3);
     ``.csv`` and ``.txt`` (rows of numbers, separated by commas, semicolons or blanks).  Shapes are read first: a small
-    file may unpack to more than the memory holds.  Of several arrays it is the one called ``name``.
+    file may unpack to more than the memory holds.  Of several arrays it is the one called ``name``, also beside a
+    sparse matrix, as in P.npz of a run.
 
     Raises
     ------
@@ -73,24 +73,6 @@ def read_vector(path: Path, name: str = "") -> Floats:
     return array.ravel() if array.size == max(array.shape, default=0) else array
 
 
-def read_array(path: Path, name: str) -> Floats:
-    """One array of a file ``.npz`` that holds a sparse matrix too, as P.npz of a run does.
-
-    Raises
-    ------
-    ProblemError
-    """
-    try:
-        with path.open("rb") as file:
-            _within(max(_rows(file), default=0))
-            file.seek(0)
-            return _real(np.load(file, allow_pickle=False)[name], name)
-    except _Refusal as error:
-        raise ProblemError(str(path), name, None, str(error)) from None
-    except DAMAGED:
-        raise ProblemError(str(path), name, None, "not an array that numpy saved") from None
-
-
 def names_in(path: Path) -> tuple[str, ...]:
     """The names of the arrays in a file ``.npz`` or ``.mat``; none where it is neither, or damaged."""
     try:
@@ -104,11 +86,6 @@ def names_in(path: Path) -> tuple[str, ...]:
     except DAMAGED:
         pass
     return ()
-
-
-def is_interface(path: Path) -> bool:
-    """True if a file has all arrays of an ``interface.npz``."""
-    return set(NEEDED) <= set(names_in(path))
 
 
 def _within(rows: int) -> None:
@@ -140,7 +117,7 @@ def _numpy(path: Path, name: str) -> np.ndarray:
         data = np.load(file, allow_pickle=False)
         if isinstance(data, np.ndarray):
             return data
-        if "format" in data.files and "shape" in data.files:
+        if name not in data.files and {"format", "shape"} <= set(data.files):
             _within(int(np.max(data["shape"])))
             file.seek(0)
             return _dense(sp.load_npz(file))

@@ -54,17 +54,11 @@ class Runs(Evidence):
     #: Words for what was given.
     given_as: ClassVar[str]
 
-    @property
-    def estimated(self) -> bool:
-        """True if steps follow from an estimate."""
-        return False
-
     def spectra(self) -> tuple[Role, ...]:
         """The roles of the runs, where they decide rho."""
         if self.rho is None:
             return ()
-        role = role_of(None, self.rho, nothing="an observed ratio proves nothing", reason=OF_ONE_RUN)
-        return (replace(role, level="estimated" if self.estimated else "known"),)
+        return (role_of(None, self.rho, nothing="an observed ratio proves nothing", reason=OF_ONE_RUN),)
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
         """For the theta to paste; only the largest eigenvalue is known."""
@@ -129,14 +123,11 @@ class Logs(Runs):
     interval: RhoInterval
     spectrum: Spectrum | None = None
 
-    @property
-    def estimated(self) -> bool:
-        """True if a run was relaxed by Aitken or a quasi-Newton method."""
-        return bool(self.accelerated)
-
     def spectra(self) -> tuple[Role, ...]:
-        """The roles of the runs, where they decide rho."""
-        return super().spectra() if self.spectrum is None else (estimated(self.spectrum, FACTORS),)
+        """The roles of the runs, where they decide rho; an estimate beside a run that was not relaxed by a constant."""
+        if self.spectrum is not None:
+            return (estimated(self.spectrum, FACTORS),)
+        return tuple(replace(role, level="estimated" if self.accelerated else "known") for role in super().spectra())
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
         """On the spectrum by Aitken's factors, with the roles exchanged too, or for the theta to paste."""

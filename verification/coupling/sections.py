@@ -146,8 +146,13 @@ def _which_body(found: Advice) -> Section:
     if found.problem is not None and found.problem.several:
         said.append(f"Solvers of {neumann} read forces and write displacements, those of {contact} the reverse.")
     else:
-        said.append(f"{neumann}'s solver reads forces and writes displacements, {contact}'s the reverse.".capitalize())
+        said.append(reads(neumann, contact))
     return which_body(*said)
+
+
+def reads(neumann: str, contact: str, forces: str = "forces", moves: str = "displacements") -> str:
+    """The data that each solver reads and writes."""
+    return f"{neumann}'s solver reads {forces} and writes {moves}, {contact}'s the reverse.".capitalize()
 
 
 def _which_theta(found: Advice) -> Section:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
@@ -245,22 +246,15 @@ def of_solver(body: BodyNumber, S: Any, solve: Any, n: int) -> Side:
     seen, apply = side.seen, side.apply
     u, v = np.random.default_rng(1).standard_normal((2, n))
     if apply is not None:
-        Su, Sv = apply(u), apply(v)
-        energies = float(u @ Su), float(v @ Sv)
-        if not min(energies) >= 0:
-            raise ValueError(f"{name} is not positive (u'Su = {min(energies):.3g} for some u): needed a stiffness")
+        _, skew = _tried(name, apply, u, v, "u'Su = {:.3g} for some u): needed a stiffness", 0.0)
         if seen.form == "operator":
-            scale = np.sqrt(energies[0] * energies[1]) or 1.0
-            seen = replace(seen, asymmetry=_symmetric(name, abs(float(u @ Sv - v @ Su)) / scale))
+            seen = replace(seen, asymmetry=_symmetric(name, skew))
     if inverse is not None and solve is not None:
-        Fu, Fv = inverse(u), inverse(v)
-        energies = float(u @ Fu), float(v @ Fv)
-        if not min(energies) > 0:
-            raise ValueError(
-                f"solve{body} is not positive (f'u = {min(energies):.3g} for some f): needed the inverse of S"
-            )
-        _symmetric(f"solve{body}", abs(float(u @ Fv - v @ Fu)) / float(np.sqrt(energies[0] * energies[1])))
-        if apply is not None and not (off := float(np.linalg.norm(apply(Fu) - u) / np.linalg.norm(u))) <= INVERSE:
+        needed = "f'u = {:.3g} for some f): needed the inverse of S"
+        Fu, skew = _tried(f"solve{body}", inverse, u, v, needed, math.ulp(0.0))
+        _symmetric(f"solve{body}", skew)
+        off = 0.0 if apply is None else float(np.linalg.norm(apply(Fu) - u) / np.linalg.norm(u))
+        if not off <= INVERSE:
             raise ValueError(
                 f"solve{body} is not the inverse of {name}: their product changes a vector by {off:.2g} of it"
             )
@@ -284,6 +278,15 @@ def _of_sparse(name: str, S: sp.csc_array, inverse: Apply | None) -> tuple[Side,
             raise ValueError(f"{name} is not positive definite: needed a Schur complement of a stiffness matrix")
     seen = SeenMatrix(rows=n, form="matrix", asymmetry=float(skew), zeros=1 - full, free_motions=0)
     return Side(seen=seen, apply=symmetric.__matmul__), inverse
+
+
+def _tried(name: str, function: Apply, u: Floats, v: Floats, refusal: str, least: float) -> tuple[Floats, float]:
+    """What a function makes of u, and its asymmetry by u and v over their energies, which are ``least`` at least."""
+    Au, Av = function(u), function(v)
+    energies = float(u @ Au), float(v @ Av)
+    if not min(energies) >= least:
+        raise ValueError(f"{name} is not positive ({refusal.format(min(energies))}")
+    return Au, abs(float(u @ Av - v @ Au)) / (math.sqrt(energies[0] * energies[1]) or 1.0)
 
 
 def _symmetric(name: str, skew: float) -> float:

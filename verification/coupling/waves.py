@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -81,10 +80,6 @@ class Waves(Evidence):
     def one(self, name: str) -> Fraction | None:
         """The first number of a parameter; None where it was not given."""
         return self.given[name][0] if name in self.given else None
-
-    @abstractmethod
-    def spectra(self) -> tuple[Role, ...]:
-        """Both roles, from both ends of the spectrum or one wave."""
 
 
 #: The parameters, in the order in which they are shown.

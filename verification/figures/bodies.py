@@ -196,7 +196,7 @@ def _colour(ax: Axes, cells: list[PolyCollection], stress: str, values: list[Flo
         collection.set(array=colours, clim=(low, high), cmap="viridis", edgecolor="0.5")
         corners = np.array([path.vertices for path in collection.get_paths()])
         for i in bodies.problem.numbers(int(body.name[-1])):
-            own = corners[body.mesh.surfaces[f"body{i}"]] if bodies.interface.lines else corners
+            own = corners[body.mesh.surfaces[f"body{i}"]] if bodies.interface.several else corners
             points = own.reshape(-1, 2)
             seen = points[((points > corner) & (points < opposite)).all(axis=1)]
             if len(seen):
@@ -210,7 +210,7 @@ def _draw_stresses(ax: Axes, contact: ContactFields, bodies: TwoBodies) -> None:
     if law is not None and contact.bound.any():
         look: Any = {"facecolor": "0.9", "edgecolor": "0.4", "linestyle": ":"}
         ax.fill_between(contact.x, -contact.bound, contact.bound, label=f"friction bound\n({plain(law.words)})", **look)
-    who = "the second" if bodies.interface.lines else "body 2"
+    who = "the second" if bodies.interface.several else "body 2"
     curves = ("pressure $-\\sigma_N$", contact.pressure), (f"shear $\\sigma_T$ on {who}", contact.shear)
     _draw_along(ax, contact, curves, f"stress [{plain(bodies.problem.units['stress'])}]")
 

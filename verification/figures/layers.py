@@ -11,7 +11,7 @@ from bisect import bisect_right, insort
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import TopologicalSorter
-from itertools import accumulate, pairwise
+from itertools import accumulate, pairwise, product
 from statistics import fmean
 
 Point = tuple[float, float]
@@ -153,24 +153,23 @@ def _ordered(rows: list[list[Item]], down: Links, up: Links) -> list[list[Item]]
             own = {item: (i + 0.5) / len(row) for i, item in enumerate(row)}
             means = {item: fmean([near[other] for other in ties[item]] or [own[item]]) for item in row}
             row.sort(key=means.__getitem__)
-        _exchange(rows, down)
+        _exchange(rows, down, up)
         if (found := count(rows)) < fewest:
             best, fewest = [list(row) for row in rows], found
     return best
 
 
-def _exchange(rows: list[list[Item]], down: Links) -> None:
-    """Exchange neighbours in a row wherever fewer edges cross then."""
-    for k, row in enumerate(rows):
-        around = rows[max(k - 1, 0) : k + 2]
-        count = lambda: sum(_crossings(*two, down) for two in pairwise(around))  # noqa: B023
-        now = count()
+def _exchange(rows: list[list[Item]], down: Links, up: Links) -> None:
+    """Exchange neighbours in a row wherever fewer of their edges cross then."""
+    for above, row, below in zip([[], *rows], rows, [*rows[1:], []], strict=False):
+        place = {item: i for beside in (above, below) for i, item in enumerate(beside)}
+        ends = {item: [[place[end] for end in links[item]] for links in (up, down)] for item in row}
+        pairs = lambda a, b, ends=ends: (ij for two in zip(ends[a], ends[b], strict=True) for ij in product(*two))
+        crossed = lambda a, b, pairs=pairs: sum(i > j for i, j in pairs(a, b))
         for i in range(len(row) - 1):
-            row[i : i + 2] = row[i + 1], row[i]
-            if (found := count()) < now:
-                now = found
-            else:
-                row[i : i + 2] = row[i + 1], row[i]
+            a, b = row[i : i + 2]
+            if crossed(b, a) < crossed(a, b):
+                row[i : i + 2] = b, a
 
 
 def _placed(

@@ -506,9 +506,9 @@ def _lines_on(nodes: Ints, interface: Interface, *, own: bool) -> Iterator[tuple
 
     ``own`` is True for the body that carries the contact grid.
     """
-    for contact, neumann, ends in interface.stretches:
-        line, grid = (contact, interface.contact) if own else (neumann, interface.neumann)
-        yield nodes[line], grid.x[line], ends
+    for line in interface.lines:
+        on, grid = (line.contact, interface.contact) if own else (line.neumann, interface.neumann)
+        yield nodes[on], grid.x[on], interface.contact.x[line.contact][[0, -1]]
 
 
 def _covered(mesh: Mesh, facets: Ints, nodes: Ints, x: Floats | None, ends: Floats) -> Floats:

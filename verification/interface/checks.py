@@ -140,7 +140,7 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
         where = f"by {depth:.3g} {bodies.problem.units['length']} at {_show(at)}"
         low, high = grid.place(0), grid.place(-1).removeprefix("x = ")
         short = f"Gamma_c, from {low} to {high}, is too short, and the forces are wrong"
-        if bodies.interface.lines:
+        if bodies.interface.several:
             short = "a line of contact is too short or is missing, and the forces are wrong"
         crossed = (f"outside Gamma_c the bodies lie in each other, {where}: {short}",)
     return Checks(

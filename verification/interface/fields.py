@@ -103,7 +103,7 @@ class ContactFields(Value, Part):
         names = np.where(state.touching, np.where(slides, "slip", "stick"), "open")
         return cls(
             x=grid.x if grid.points is None else grid.points[:, 0],
-            s=np.concatenate([grid.x[line] - ends[0] for line, _, ends in interface.stretches]),
+            s=np.concatenate([grid.x[line.contact] - grid.x[line.contact.start] for line in interface.lines]),
             y=None if grid.points is None else grid.points[:, 1],
             normal=grid.upright if plane else None,
             weights=grid.weights,
@@ -114,7 +114,7 @@ class ContactFields(Value, Part):
             slip=slip + interface.offset[grid.tangential] if plane else zero,
             slip_increment=slip.copy(),
             status=tuple(str(name) for name in names),
-            lines=interface.lines,
+            lines=interface.lines if interface.several else (),
         )
 
     def in_order(self) -> ContactFields:

@@ -204,7 +204,7 @@ class Law(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Stretch:
-    """The line between two of several bodies.
+    """A line between two bodies.
 
     Attributes
     ----------
@@ -246,7 +246,7 @@ class Interface(Value):
     slipped : array, shape (t of the contact grid,)
         ``u1_T - u2_T`` before the load increment, from which friction measures slip, unit of length.
     lines : tuple of Stretch
-        The lines of more than two bodies, one after the other; empty for two bodies, which have one line.
+        The lines of Gamma_c, one after the other; two bodies mostly have one.
     """
 
     contact: Grid
@@ -256,9 +256,9 @@ class Interface(Value):
     held: Nodes
     planes: tuple[Nodes, Nodes]
     slipped: Floats
+    lines: tuple[Stretch, ...]
     law: Law | None = None
     profile: Profile | None = None
-    lines: tuple[Stretch, ...] = ()
 
     @classmethod
     def joining(
@@ -276,9 +276,10 @@ class Interface(Value):
         ``support`` is what supports hold of both bodies' contact nodes, the contact body first.
         """
         held, planes = held_along(support, contact, neumann)
-        given: dict[str, Any] = {"held": held, "planes": planes, "slipped": np.zeros(contact.t)} | rest
+        whole = Stretch(bodies=(1, 2), contact=slice(0, contact.n), neumann=slice(0, neumann.n), flipped=False)
+        given: dict[str, Any] = {"held": held, "planes": planes, "slipped": np.zeros(contact.t), "lines": (whole,)}
         law = law if contact.t else None  # bars meet at a point
-        found = cls(contact=contact, neumann=neumann, join=ONE_GRID, law=law, **given)
+        found = cls(contact=contact, neumann=neumann, join=ONE_GRID, law=law, **given | rest)
         return replace(found, join=found.holding(joined(transfer, contact.normals, neumann.normals)))
 
     def holding(self, join: Join) -> Join:
@@ -305,13 +306,12 @@ class Interface(Value):
     @property
     def varies(self) -> bool:
         """True if the coefficient of friction may differ from place to place: k is then the largest one."""
-        return self.profile is not None or bool(self.lines)
+        return self.profile is not None or self.several
 
     @property
-    def stretches(self) -> list[tuple[slice, slice, Floats]]:
-        """The nodes of each line on the contact grid and on the Neumann grid, and its ends as positions."""
-        every = [(line.contact, line.neumann) for line in self.lines] or [(slice(None), slice(None))]
-        return [(own, other, self.contact.x[own][[0, -1]]) for own, other in every]
+    def several(self) -> bool:
+        """True if Gamma_c has several lines."""
+        return len(self.lines) > 1
 
     @property
     def moduli(self) -> Interface:

@@ -139,7 +139,7 @@ class ContactPair(Value):
         ValueError
             Unless all k >= 0 and one for each contact node, or if friction has no law.
         """
-        if self.interface.lines:
+        if self.interface.several:
             raise ValueError("friction: needed a number, or a table in each [[contact]] of the file")
         s = [Fraction(at) for at in self.contact.grid.s.tolist()]
         if isinstance(friction, np.ndarray) and friction.dtype.kind not in "OU":  # those may hold exact numbers

@@ -38,14 +38,7 @@ _RUN = (*_RESULT, "history.csv", "interface.npz", *_drawn("residuals"))
 FILES: dict[Kind, tuple[str, ...]] = {
     "run": ("run.json", *_RUN),
     "solve": ("solve.json", *_RESULT),
-    "march": (
-        "history.json",
-        "contact.csv",
-        "history.csv",
-        "body1.pvd",
-        "body2.pvd",
-        *_drawn("loop", "states", "shear"),
-    ),
+    "march": ("history.json", "contact.csv", "history.csv", *_SERIES, *_drawn("loop", "states", "shear")),
     "compare": ("compare.json", *_RUN, *_drawn("waterfall"), "report.html"),
     "reproduce": ("reproduce.json", *_drawn("reproduce"), *(f"fig{number}.csv" for number in (5, 10, 11, 12))),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,21 +70,16 @@ class Folder:
         """
         with staged(self.path, files_of(self.kind, self.path)) as room:
             _text(room / FILES[self.kind][0], found.to_json())
-            match self.kind:
-                case "verify":
-                    _pages(room, found)
-                case "reproduce":
-                    _reproduced(room, found)
-                case "compare":
-                    self._compared(room, found)
-                case "march":
-                    self._marched(room, found)
-                case _:
-                    self._tables(room, found)
-                    _pictures(room, found)
+            others: dict[Kind, Callable[[Path, Any], object]] = {"verify": _pages, "reproduce": _reproduced}
+            others |= {"compare": self._compared, "march": self._marched}
+            others.get(self.kind, self._drawn)(room, found)
             if unknown := {path.name for path in room.iterdir()} - {*files_of(self.kind, room), "problem.toml"}:
                 names = ", ".join(sorted(unknown))
                 raise RuntimeError(f"{names}: needed in FILES, so that a file of a user's is never overwritten")
+
+    def _drawn(self, room: Path, result: Run | Solution) -> None:
+        self._tables(room, result)
+        _pictures(room, result)
 
     def _compared(self, room: Path, comparison: Comparison) -> None:
         """The files of the run, and ``report.html``."""
@@ -124,6 +119,11 @@ class Folder:
     def _problem(self, room: Path, result: Document) -> None:
         if result.problem is not None and ours(self.path / "problem.toml"):
             _text(room / "problem.toml", f"{MARKS['.toml'].decode()}\n{result.problem.to_toml()}")
+
+
+def writer(path: Path | None, kind: Kind) -> Callable[[Any], None] | None:
+    """Return the function that writes a result into a folder, which is checked at once; None where none was named."""
+    return None if path is None else Folder(path, kind).write
 
 
 def _reproduced(room: Path, found: Reproduction) -> None:

@@ -21,7 +21,7 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from ndtheory import keys
-from verification.problem.tables import TomlTable, Unfit
+from verification.problem.tables import TomlTable
 from verification.problem.writing import plain
 
 T = TypeVar("T")
@@ -73,8 +73,6 @@ class At:
 
     def inside(self, value: Any) -> TomlTable:
         """Return the value of the key that is read as a table."""
-        if not isinstance(value, Mapping):
-            raise Unfit("needed a table")
         return self.table.within(self.name, value)
 
 

@@ -66,8 +66,7 @@ class MeshFile(Part):
             Not a file, too large, or with another SHA-256 than the one given.
         """
         file = cls(path=path.absolute(), sha256=sha256 or _fingerprint(path))
-        why = file.unusable() if sha256 else None
-        if why:
+        if sha256 and (why := file.unusable()):
             raise Unfit(why)
         return file
 
@@ -83,8 +82,7 @@ class MeshFile(Part):
 
 
 def _fingerprint(path: Path) -> str:
-    why = unreadable(path, MOST_MESH_BYTES)
-    if why:
+    if why := unreadable(path, MOST_MESH_BYTES):
         raise Unfit(why)
     try:
         with path.open("rb") as file:
@@ -151,6 +149,9 @@ def _parts(value: Any, at: At) -> dict[str, SidePart]:
 
 
 _elastic = lambda at: at["shape"] != "rigid"
+#: What the loads have in common: none of a rigid body, and they come last in a table.
+_LOAD: dict[str, Any] = {"only": _elastic, "order": LAST}
+_ON_SIDES: dict[str, Any] = {**_LOAD, "default": EMPTY, "initial": ReadOnly(), "type": "map of vector"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,25 +160,12 @@ class Loads(Entries):
 
     prescribed: Mapping[str, Components] = entry(
         'sides with a given displacement, as `{ top = [0.0, -0.015] }`; `"free"` leaves a component free',
-        None,
-        EMPTY,
-        "length",
+        unit="length",
         reader=lambda value, at: readers.by_side(value, at, free=True),
-        only=_elastic,
-        initial=ReadOnly(),
-        type="map of vector",
-        order=LAST,
+        **_ON_SIDES,
     )
     traction: Mapping[str, tuple[Fraction, ...]] = entry(
-        "force per area on sides, as `{ right = [0.0, -60.0] }`",
-        None,
-        EMPTY,
-        "stress",
-        reader=readers.by_side,
-        only=_elastic,
-        initial=ReadOnly(),
-        type="map of vector",
-        order=LAST,
+        "force per area on sides, as `{ right = [0.0, -60.0] }`", unit="stress", reader=readers.by_side, **_ON_SIDES
     )
     body_force: tuple[Fraction, ...] = entry(
         "force per volume, as `[0.0, -1.0]`",
@@ -185,10 +173,9 @@ class Loads(Entries):
         lambda at: at["kept"],
         "stress/length",
         reader=readers.vector,
-        only=_elastic,
         initial=(),
         type="vector",
-        order=LAST,
+        **_LOAD,
     )
 
 

@@ -260,21 +260,18 @@ class TomlTable:
         except Unfit as error:
             raise self.refuse(name, value, str(error)) from None
 
-    def within(self, name: str, value: Mapping[str, Any]) -> TomlTable:
+    def within(self, name: str, value: Any) -> TomlTable:
         """Return the value of a key as a table."""
+        if not isinstance(value, Mapping):
+            raise Unfit("needed a table")
         table = TomlTable(value, self._file, self.key(name))
         self._below.append(table)
         return table
 
     def table(self, name: str, *, required: bool = False) -> TomlTable:
         """Read a sub-table; a missing one is empty unless required."""
-
-        def read(value: Any) -> TomlTable:
-            if not isinstance(value, Mapping):
-                raise Unfit("needed a table")
-            return self.within(name, value)
-
-        return self.take(name, read) if required else self.take(name, read, self.within(name, {}))
+        missing = () if required else (self.within(name, {}),)
+        return self.take(name, lambda value: self.within(name, value), *missing)
 
     def names(self) -> Iterable[str]:
         """Return the keys not taken yet."""

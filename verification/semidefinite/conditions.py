@@ -18,7 +18,7 @@ from verification.interface.pair import ContactPair
 from verification.machine.threads import one_thread
 from verification.semidefinite import LARGEST
 from verification.semidefinite.interior_point import Optimum, Program, Weights
-from verification.semidefinite.trace_forms import TraceForms, families
+from verification.semidefinite.trace_forms import TraceForms, families, weighed
 
 Signs = NDArray[np.int8]
 Cones = NDArray[np.intp]
@@ -123,22 +123,17 @@ class Conditions:
         self.p = np.hstack([np.zeros((neumann.size, neumann.size)), back])
         force = np.hstack([np.zeros((contact.size, neumann.size)), B])
         jump = np.hstack([-interface.carry(pair.neumann.flexibility(L_2)), -flexible @ B])
-        weight = zeta = None
+        taken = np.hstack([L_2, np.zeros((neumann.size, B.shape[1]))])
+        self.families = families(pair, k, interface.kernel, taken, force, jump)
         if k:
-            assert interface.kernel is not None
-            weight = np.sqrt(k * contact.weights)[:, None]
-            zeta = weight * (interface.kernel @ np.hstack([L_2[neumann.normal], np.zeros((neumann.n, B.shape[1]))]))
-            self.weight = weight[:, 0]
-            self.reach = weight * zeta  # w k zeta
-        self.families = families(contact, force, jump, weight, zeta)
+            self.weight = np.sqrt(k * contact.weights)
+            self.reach = self.weight[:, None] * self.families[2][0]  # w k zeta
         self.carried = B
 
     def conditions(self, multipliers: Weights) -> Floats:
         """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
-        total = np.zeros((self.g.shape[1],) * 2)
-        for values, (a, b) in zip(multipliers, self.families, strict=False):  # the last families are only for Pieces
-            total += a.T @ (values[:, None] * b)
-        return (total + total.T) / 2
+        total = weighed(multipliers, self.families)
+        return np.asarray(total + total.T) / 2
 
     def inner(self, one: Floats, other: Floats) -> Floats:
         """The inner product of two linear forms in the norm of the factor: (5.21), Euclidean in these coordinates.

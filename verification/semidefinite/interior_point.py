@@ -261,12 +261,10 @@ def solve(program: Program) -> Optimum:
     lengths = [np.linalg.norm(rows, axis=1) for rows in (program.left, program.right)]
     # A node that no force reaches has rows without a length: its multiplier weighs nothing.
     lengths = [np.where(length > 0, length, 1.0) for length in lengths]
+    size = lengths[0] * lengths[1]
     if program.tie is not None:  # rows with one multiplier have one scale
-        of = program.tie.argmax(axis=1)
         most = [np.max(program.tie * length[:, None], axis=0) for length in lengths]
-        lengths, size = [values[of] for values in most], most[0] * most[1]
-    else:
-        size = lengths[0] * lengths[1]
+        lengths, size = [values[program.tie.argmax(axis=1)] for values in most], most[0] * most[1]
     rows = [r / n[:, None] for r, n in zip((program.left, program.right), lengths, strict=True)]
     forms = [MatrixBlock(program, block, *rows) for block in program.blocks]
     blocks: list[MatrixBlock | Cones] = [*forms, *_cones(program, size)]

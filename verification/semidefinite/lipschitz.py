@@ -364,10 +364,12 @@ class Semidefinite(Part):
         one quadratic form decides.  A smaller one from dividing the pieces stays in ``divided``.
         """
         assert self.whole is not None
+        found_beside = {"theta_max": self.theta_max, "friction_threshold": self.friction_threshold}
+        numbers = {name: number for name, number in found_beside.items() if number is not None}
         try:
             confirmation = Confirmation(pair, progress=progress)
         except NoCertificate as error:
-            return replace(self, not_proved=str(error), unverified=dict.fromkeys(self._found_beside(), str(error)))
+            return replace(self, not_proved=str(error), unverified=dict.fromkeys(numbers, str(error)))
 
         def multipliers(k: float) -> Weights:
             found = QuadraticForms(pair, measured, friction=k).friction_number()
@@ -379,7 +381,7 @@ class Semidefinite(Part):
         }
         kept: dict[str, Any] = {}
         why: dict[str, str] = {}
-        for name, number in self._found_beside().items():
+        for name, number in numbers.items():
             try:
                 least = below(proofs[name](number))
                 kept[name] = Number(value=max(number.value, least), lo=least, level="verified")
@@ -395,11 +397,6 @@ class Semidefinite(Part):
             return replace(beside, not_proved=f"1 - {float(1 - found):.3g} is proved, which no double tells from 1")
         number = Number(value=min(self.whole.value, most), hi=most, level="verified")
         return replace(beside, lipschitz=number, divided=self.lipschitz, not_proved="")
-
-    def _found_beside(self) -> dict[str, Number]:
-        """The largest theta and the friction threshold, where there are any."""
-        found = {"theta_max": self.theta_max, "friction_threshold": self.friction_threshold}
-        return {name: number for name, number in found.items() if number is not None}
 
 
 def work_out(

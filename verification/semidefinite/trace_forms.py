@@ -17,25 +17,32 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from fem1d2d.proofs.enclosed import Enclosed, gamma, upwards
 from fem1d2d.proofs.loewner import positive_definite
-from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 
+Families = list[tuple[Floats, Floats]]
 
-def families(
-    contact: Grid, force: Floats, jump: Floats, weight: Floats | None, zeta: Floats | None
-) -> list[tuple[Floats, Floats]]:
+
+def families(pair: ContactPair, k: float, kernel: Floats | None, g: Floats, force: Floats, jump: Floats) -> Families:
     """Factors of the multiplied conditions, a row for each node; only of (2.4) without friction.
 
-    Those behind the fourth are for :class:`verification.semidefinite.conditions.Pieces`.  ``force`` and ``jump`` are
-    the forms p and v, ``weight`` is ``sqrt(w k)`` as a column and ``zeta`` the form zeta times it.
+    ``g`` are forces on the Neumann grid, ``force`` and ``jump`` p and v on the contact grid, each as linear forms.
+    Those behind the fourth are for :class:`verification.semidefinite.conditions.Pieces`.
     """
+    contact = pair.contact.grid
     press, gap = force[contact.normal], jump[contact.normal]
-    if weight is None or zeta is None:
+    if not k:
         return [(press, gap)]
+    assert kernel is not None
     shear, slip = force[contact.tangential], jump[contact.tangential]
-    slide = weight * slip
+    weight = np.sqrt(k * contact.weights)[:, None]
+    zeta, slide = weight * (kernel @ g[pair.neumann.grid.normal]), weight * slip
     found = [(press, gap), (shear, slip), (zeta, zeta), (slide, slide)]
     return [*found, (zeta, slide), (gap, gap), (press, press), (shear, shear), (shear, zeta)]
+
+
+def weighed(multipliers: Sequence[Floats], families: Families) -> Floats:
+    """The sum over the nodes of the multiplied conditions; the last families are left out where nothing is fixed."""
+    return np.asarray(sum(a.T @ (values[:, None] * b) for values, (a, b) in zip(multipliers, families, strict=False)))
 
 
 class TraceForms:
@@ -55,8 +62,8 @@ class TraceForms:
     def __init__(
         self, pair: ContactPair, k: float, *, S_1: Floats, carries: slice, near: tuple[Floats, Floats]
     ) -> None:
-        contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
-        S_2, size = pair.neumann.schur, neumann.size
+        contact, interface = pair.contact.grid, pair.interface
+        S_2, size = pair.neumann.schur, pair.neumann.grid.size
         still = np.zeros((contact.size, len(S_1)))
         moved, pressed = still.copy(), still.copy()
         moved[carries], pressed[carries] = np.eye(len(S_1)), S_1
@@ -69,14 +76,10 @@ class TraceForms:
         self._p_size = np.hstack([np.zeros((size, size)), moduli.carry_back(np.abs(pressed))])
         force = np.hstack([np.zeros((contact.size, size)), pressed])
         jump = -np.hstack([interface.carry(np.eye(size)), moved])
-        weight = zeta = zeta_size = None
-        if k:
-            assert interface.kernel is not None
-            weight = np.sqrt(k * contact.weights)[:, None]
-            zeta = weight * (interface.kernel @ self._g[neumann.normal])
-            zeta_size = weight * (np.abs(interface.kernel) @ np.abs(self._g[neumann.normal]))
-        self._families = families(contact, force, jump, weight, zeta)
-        self._sizes = families(contact, np.abs(force), np.abs(jump), weight, zeta_size)
+        kernel = interface.kernel
+        self._families = families(pair, k, kernel, self._g, force, jump)
+        kernel = None if kernel is None else np.abs(kernel)
+        self._sizes = families(pair, k, kernel, np.abs(self._g), np.abs(force), np.abs(jump))
         # inner products over nodes (a transfer has them too), over traces twice, and the scalars, weights and sums
         self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.one_grid else 4) * contact.n + 30
         self._free = _changed(S_2, near[:1])
@@ -96,8 +99,8 @@ class TraceForms:
         The result takes the square and, with a step, its weight, 1 by default; it is True if the form is positive
         definite for sure.
         """
-        form = -cross * self._d.T @ self._p - _conditions(multipliers, self._families)
-        size = abs(cross) * self._d.T @ self._p_size + _conditions([np.abs(m) for m in multipliers], self._sizes)
+        form = -cross * self._d.T @ self._p - weighed(multipliers, self._families)
+        size = abs(cross) * self._d.T @ self._p_size + weighed([np.abs(m) for m in multipliers], self._sizes)
         near: tuple[Floats, ...] = self._near
         first = 0
         if step is not None:
@@ -135,8 +138,3 @@ def _changed(form: Floats, near: Sequence[Floats]) -> Floats:
             result[rows, columns] = block if i > j else (block + block.T) / 2
             result[columns, rows] = result[rows, columns].T
     return result
-
-
-def _conditions(multipliers: Sequence[Floats], families: Sequence[tuple[Floats, Floats]]) -> Floats:
-    """The sum over the nodes of the multiplied conditions; the last families are left out where nothing is fixed."""
-    return np.asarray(sum(a.T @ (values[:, None] * b) for values, (a, b) in zip(multipliers, families, strict=False)))

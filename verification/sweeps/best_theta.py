@@ -176,7 +176,7 @@ def best_theta(
         rho=rho,
         predicted=predicted,
         seen=found("seen", "" if runs else "no runs were asked for", lambda: _seen(pair, rho), "no run arrived"),
-        linearised=found("linearised", "", lambda: _linearised(pair)),
+        linearised=found("linearised", "", lambda: _linearised(pair, measured)),
         energy=found("energy", outside, lambda: _energy(energy), "q(theta) is below 1 for no theta"),
         semidefinite=found(
             "semidefinite",
@@ -198,9 +198,9 @@ def _energy(energy: EnergyBounds) -> Least | None:
     return None if theta is None or factor is None else Least(theta=theta, factor=factor.value)
 
 
-def _linearised(pair: ContactPair) -> Least:
+def _linearised(pair: ContactPair, measured: Measured) -> Least:
     """The moduli of the eigenvalues ``1 - theta + theta mu`` are convex functions of theta, and so is their largest."""
-    known = KnownPieces(pair)
+    known = KnownPieces(pair, measured)
     solution = known.solution()
     piece = known.piece(solution)
     if not piece.balanced:

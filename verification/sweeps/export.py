@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ndtheory import __version__
-from verification.algorithm.relaxation import Rule
 from verification.extras import require
-from verification.sweeps.row import COLUMNS, RESULTS, title
+from verification.sweeps.row import COLUMNS, RESULTS, plain, title
 from verification.sweeps.sweep import Sweep
 
 if TYPE_CHECKING:
@@ -53,10 +52,9 @@ def dataset(sweep: Sweep) -> xarray.Dataset:
                 of_body = [float(pair[i - 1]) for pair in values]
                 coordinates[f"young{i}"] = ("young", of_body, attributes(f"young{i}", False))
         else:
-            plain = [_plain(value) for value in values]
-            if any(isinstance(value, str) for value in plain):
-                plain = [str(value) for value in plain]
-            coordinates[name] = (name, plain, attributes(name, isinstance(plain[0], str)))
+            found = ["auto" if value == "auto" else plain(value) for value in values]
+            words = any(isinstance(value, str) for value in found)
+            coordinates[name] = (name, [str(value) for value in found] if words else found, attributes(name, words))
 
     variables: dict[str, Any] = {}
     for name in RESULTS:
@@ -84,9 +82,3 @@ def write_dataset(sweep: Sweep, path: Path) -> None:
     with tempfile.TemporaryDirectory() as room:  # the library writes only where names are UTF-8
         dataset(sweep).to_netcdf(f"{room}/sweep.nc", engine="netcdf4")
         shutil.copyfile(f"{room}/sweep.nc", path)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Rule):
-        return value.name
-    return value if isinstance(value, (int, str)) else float(value)

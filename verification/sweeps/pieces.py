@@ -22,6 +22,7 @@ from verification.algorithm.linearisation import NotLinear, at_solution
 from verification.algorithm.monolithic import SolveError
 from verification.algorithm.rates import Noise
 from verification.algorithm.start import Start, begin_at, compared_with
+from verification.constants import Measured
 from verification.contact import ContactError
 from verification.contact.active_set import SLACK, Pattern, Systems
 from verification.interface.pair import ContactPair
@@ -133,10 +134,10 @@ def key_of(piece: Piece) -> Key:
 
 
 class KnownPieces:
-    """Shared data of the runs of one pair: its affine pieces, and the solution of the global method."""
+    """Shared data of the runs of one pair: its constants, its affine pieces, and the solution of the global method."""
 
-    def __init__(self, pair: ContactPair) -> None:
-        self.pair = pair
+    def __init__(self, pair: ContactPair, measured: Measured) -> None:
+        self.pair, self.measured = pair, measured
         contact = pair.contact
         systems = self._systems = Systems(contact.schur, contact.free, contact.motions)
         factor = lru_cache(maxsize=1)(lambda: np.asarray(np.linalg.inv(pair.neumann.root), dtype=np.float64))
@@ -161,6 +162,12 @@ class KnownPieces:
     def piece(self, found: Iterate) -> Piece:
         """Return the piece of an iterate."""
         return self._piece(self.key(found))
+
+    @cached_property
+    def energy(self) -> tuple[float, float, float] | None:
+        """rho, kappa_1 and kappa_2 of the theorem in energy norms; None where they do not exist."""
+        found = self.measured.energy_constants()
+        return None if found is None else (float(found.at_work), float(found.kappa_1), float(found.kappa_2))
 
     @cached_property
     def noise(self) -> Noise:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
 from itertools import count, groupby, repeat
 from typing import Any, NamedTuple
 
@@ -118,24 +118,6 @@ def title(column: str, units: Mapping[str, str]) -> str:
     return COLUMNS[column].says.partition(";")[0] + (f" ({unit})" if unit else "")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RowSetting:
-    """Shared data of rows that differ only in theta or in the rule.
-
-    ``pieces`` are the affine pieces of T that runs have passed through.
-    """
-
-    pair: ContactPair
-    measured: Measured
-    pieces: KnownPieces
-
-    @cached_property
-    def energy(self) -> tuple[float, float, float] | None:
-        """rho, kappa_1 and kappa_2 of the theorem in energy norms; None where they do not exist."""
-        found = self.measured.energy_constants()
-        return None if found is None else (float(found.at_work), float(found.kappa_1), float(found.kappa_2))
-
-
 def problem_of(start: Problem | ContactPair) -> Problem | None:
     """Return the problem of a sweep; None of a pair from matrices."""
     return start if isinstance(start, Problem) else start.problem
@@ -157,37 +139,30 @@ class SharedBodies:
         self._constants = lru_cache(maxsize=KEPT)(self._measure)
         self._setting = lru_cache(maxsize=1)(self._tried)
 
-    def setting(self, values: Mapping[str, Any]) -> RowSetting:
-        """Return the data that a row shares with the rows of the same bodies and friction."""
-        found = self._setting(*self._key(values), values.get("friction"))
+    def setting(self, values: Mapping[str, Any]) -> KnownPieces:
+        """Return what a row shares with the rows that differ only in theta or in the rule."""
+        changes = tuple((name, values[name]) for name in OF_BODIES if name in values)
+        found = self._setting(values.get("refine", 0), changes, values.get("friction"))
         if isinstance(found, Exception):
             raise found.with_traceback(None)
         return found
 
-    def _tried(self, refine: int, changes: Changes, friction: Fraction | None) -> RowSetting | Exception:
-        try:
-            return self._set(refine, changes, friction)
-        except (ProblemError, HypothesisError) as error:  # the next rows are refused for the same reason
-            return error
-
-    def _set(self, refine: int, changes: Changes, friction: Fraction | None) -> RowSetting:
-        pair = self._pair(refine, changes)
-        if friction is not None:
-            pair = pair.at(friction=friction)
+    def _tried(self, refine: int, changes: Changes, friction: Fraction | None) -> KnownPieces | Exception:
         named = dict(changes)
         if "young" in named and self.problem is not None:
             # rho and the kappas do not change where both moduli are multiplied by one number
             lower, upper = named["young"]
             second = self.problem.body2.young
             named["young"] = (lower / upper * second, second)
-        measured = self._constants(refine, tuple(named.items()))
-        if measured.of_friction:  # else friction is absent, or its constants do not exist
-            measured = measured.with_friction(float(pair.friction))
-        return RowSetting(pair=pair, measured=measured, pieces=KnownPieces(pair))
-
-    @staticmethod
-    def _key(values: Mapping[str, Any]) -> tuple[int, Changes]:
-        return values.get("refine", 0), tuple((name, values[name]) for name in OF_BODIES if name in values)
+        try:
+            pair = self._pair(refine, changes)
+            pair = pair if friction is None else pair.at(friction=friction)
+            measured = self._constants(refine, tuple(named.items()))
+            if measured.of_friction:  # else friction is absent, or its constants do not exist
+                measured = measured.with_friction(float(pair.friction))
+            return KnownPieces(pair, measured)
+        except (ProblemError, HypothesisError) as error:  # the next rows are refused for the same reason
+            return error
 
     def _condense(self, refine: int) -> ContactPair:
         """Condense the bodies of the problem on a mesh halved so often."""
@@ -241,37 +216,33 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Share
         The values, the columns :data:`RESULTS`, and None where there is nothing, with ``reason`` in words; a "#" in
         words is written ``%23``.
     """
-    shared = SharedBodies(problem) if bodies is None else bodies
-    found = _given(shared, values) | dict.fromkeys(RESULTS)
-    why: dict[str, str] = {}
+    found = _given(problem_of(problem), values)
     try:
         with one_thread():
-            setting = shared.setting(values)
-            found |= _of_pair(setting.pair)
-            why |= _run(found, setting, values)
+            setting = (bodies or SharedBodies(problem)).setting(values)
+            pair = setting.pair
+            found |= {"friction": float(pair.friction), "neumann_body": pair.neumann_body}
+            found |= {} if pair.interface.law is None else {"law": pair.interface.law.name}
+            why = _run(found, setting, values)
     except ProblemError as error:
-        found["outcome"] = REFUSED
-        why["outcome"] = str(ProblemError("", error.key, error.value, error.needed))  # wherever the file lies
+        return _closed(found, {"outcome": str(ProblemError("", error.key, error.value, error.needed))}, REFUSED)
     except HypothesisError as error:
-        found["outcome"] = REFUSED
-        why["outcome"] = str(error)
+        return _closed(found, {"outcome": str(error)}, REFUSED)
     except (ContactError, SolveError) as error:
-        found["outcome"] = ERROR
-        why["outcome"] = str(error)
+        return _closed(found, {"outcome": str(error)}, ERROR)
     except Exception as error:  # the fault of one row costs no other row
-        found["outcome"] = ERROR
-        why["outcome"] = f"{type(error).__name__}: {error}"
+        return _closed(found, {"outcome": f"{type(error).__name__}: {error}"}, ERROR)
     return _closed(found, why)
 
 
 def lost(problem: Problem | ContactPair, values: Mapping[str, Any], words: str) -> Row:
     """Return the row of a run that ended with the process that made it."""
-    return _closed(
-        _given(SharedBodies(problem), values) | dict.fromkeys(RESULTS) | {"outcome": ERROR}, {"outcome": words}
-    )
+    return _closed(_given(problem_of(problem), values), {"outcome": words}, ERROR)
 
 
-def _closed(found: Row, why: Mapping[str, str]) -> Row:
+def _closed(found: Row, why: Mapping[str, str], outcome: str | None = None) -> Row:
+    """Return a row with the reasons of what is None; ``outcome`` is that of a row without a run."""
+    found["outcome"] = outcome or found["outcome"]
     found["reason"] = "; ".join(f"{name}: {' '.join(words.split())}" for name, words in why.items()) or None
     # in a CSV file a "#" begins a comment, in quotes too
     return {
@@ -279,43 +250,27 @@ def _closed(found: Row, why: Mapping[str, str]) -> Row:
     }
 
 
-def _given(bodies: SharedBodies, values: Mapping[str, Any]) -> Row:
-    """Return the columns of the grid; those that do not vary have the values of the problem."""
-    problem = bodies.problem
-    rule = values.get("rule", "constant" if problem is None else problem.iteration.relaxation)
-    start: Row = dict.fromkeys(("theta", "friction", "young1", "young2", "neumann_body"))
-    start |= {"refine": values.get("refine", 0), "law": None, "radius": None}
-    start["rule"] = rule.name if isinstance(rule, Rule) else rule
+def _given(problem: Problem | None, values: Mapping[str, Any]) -> Row:
+    """Return a row without results; columns of the grid that do not vary have the values of the problem."""
+    start: Row = {"rule": "constant", "refine": 0, "young": (None, None)}
     if problem is not None:
-        contact, theta = problem.contact, problem.iteration.theta
-        start |= {
-            "theta": None if theta == "auto" else float(theta),
-            "friction": float(contact.friction),
-            "neumann_body": problem.iteration.neumann_body,
-            "law": contact.law,
-            "radius": None if contact.radius is None else float(contact.radius),
-        }
-        bodies_of = (problem.body1, problem.body2)
-        start |= {
-            f"young{i}": None if body.rigid or body.materials else float(body.young)
-            for i, body in enumerate(bodies_of, 1)
-        }
-    if "young" in values:
-        start["young1"], start["young2"] = map(float, values["young"])
-    for name in ("theta", "friction", "radius"):
-        if name in values:
-            start[name] = None if values[name] == "auto" else float(values[name])
-    return start | {name: values[name] for name in ("neumann_body", "law") if name in values}
+        moduli = (None if body.rigid or body.materials else body.young for body in (problem.body1, problem.body2))
+        start |= (
+            vars(problem.contact) | vars(problem.iteration) | {"young": moduli, "rule": problem.iteration.relaxation}
+        )
+    start |= values
+    start["young1"], start["young2"] = start["young"]
+    return {name: plain(start.get(name)) for name in GIVEN} | dict.fromkeys(RESULTS)
 
 
-def _of_pair(pair: ContactPair) -> Row:
-    """Return the values of a pair that may differ from its problem's: friction, roles and law."""
-    law = pair.interface.law
-    found: Row = {"friction": float(pair.friction), "neumann_body": pair.neumann_body}
-    return found if law is None else found | {"law": law.name}
+def plain(value: Any) -> Any:
+    """Return a value of an axis as a column has it: a number as a float, a rule by its name, "auto" as None."""
+    if isinstance(value, Rule):
+        return value.name
+    return None if value == "auto" else float(value) if isinstance(value, Fraction) else value
 
 
-def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str, str]:
+def _run(found: Row, setting: KnownPieces, values: Mapping[str, Any]) -> dict[str, str]:
     """Fill the columns of a run; return why some of them are None."""
     pair, measured = setting.pair, setting.measured
     found["rho"] = None if measured.rho_max is None else measured.rho_max.value
@@ -326,19 +281,19 @@ def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str
     proved, unproved = _proved(setting, rule, choice)
     found |= proved
     why |= unproved
-    columns, unmet = course(pair, rule, choice, setting.pieces)
+    columns, unmet = course(pair, rule, choice, setting)
     found |= columns
     return why | unmet
 
 
-def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[str, str]]:
+def _proved(setting: KnownPieces, rule: Rule, choice: Choice) -> tuple[Row, dict[str, str]]:
     """Return the columns that a theorem gives, and why one is None."""
     pair, factor, rate = setting.pair, None, None
     outside = pair.outside + ([words] if (words := rule.outside(pair.friction)) else [])
     of_factor = of_rate = outside[0] if outside else "rho or the constants of friction do not exist"
     if isinstance(rule, Constant) and not outside:
-        factor = energy_factor(setting.energy, float(choice.theta))
-        if factor is not None:
+        if setting.energy is not None:  # even if q(theta) is 1 or more
+            factor = math.sqrt(max(1 - one_minus_square(float(choice.theta), *setting.energy), 0.0))
             rate, of_rate = (factor, "") if factor < 1 else (None, "q(theta) is not below 1")
     elif not outside:  # q is about steps with one factor, even where the rule itself has a proved rate
         of_factor = f"{rule.words}: no constant theta"
@@ -346,11 +301,6 @@ def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[
     found = {"energy_factor": factor, "proved_rate": rate}
     reasons = {"energy_factor": of_factor, "proved_rate": of_rate}
     return found, {name: words for name, words in reasons.items() if found[name] is None}
-
-
-def energy_factor(energy: tuple[float, float, float] | None, theta: float) -> float | None:
-    """Return q(theta) of the theorem in energy norms, even if it is 1 or more; None without its constants."""
-    return None if energy is None else math.sqrt(max(1 - one_minus_square(theta, *energy), 0.0))
 
 
 # --- how its run goes and ends ----------------------------------------------------------------------------------------

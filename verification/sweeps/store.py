@@ -17,6 +17,7 @@ import json
 import sqlite3
 import sys
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, replace
 from fractions import Fraction
@@ -117,7 +118,7 @@ def keys(start: Problem | ContactPair, grid: SweepGrid) -> list[bytes]:
     >>> of_theta("1/3", 0.5)[1] == of_theta("1/2")[0] != of_theta("1/3")[0]
     True
     """
-    return _keys(_shared(start, NUMERICS), grid, start.source)
+    return _keys(_shared(start), grid, start.source)
 
 
 def _keys(shared: Mapping[str, Any], grid: SweepGrid, source: str) -> list[bytes]:
@@ -130,10 +131,10 @@ def _keys(shared: Mapping[str, Any], grid: SweepGrid, source: str) -> list[bytes
     return found
 
 
-def _shared(start: Problem | ContactPair, numerics: int) -> dict[str, Any]:
+def _shared(start: Problem | ContactPair) -> dict[str, Any]:
     """The data that rows of a sweep have in common, as far as a digit of them can depend on it."""
     of: dict[str, Any] = {"problem": start.digest} if isinstance(start, Problem) else _of_pair(start)
-    return {"numerics": numerics, "solver": SOLVER, "of": json.dumps(of, sort_keys=True)}
+    return {"numerics": NUMERICS, "solver": SOLVER, "of": json.dumps(of, sort_keys=True)}
 
 
 def _text(name: str, value: Any, source: str) -> str:
@@ -171,9 +172,7 @@ def _of_pair(pair: ContactPair) -> dict[str, Any]:
         arrays |= {f"{name}.{part}": getattr(side, attribute) for part, attribute in ARRAYS.items()}
         arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}
     profile = interface.profile
-    varies = (
-        {} if profile is None else {"profile": [[exactly(v) for v in vars(profile)[name]] for name in vars(profile)]}
-    )
+    varies = {} if profile is None else {"profile": [[exactly(v) for v in column] for column in vars(profile).values()]}
     return varies | {
         "matrices": {name: None if array is None else _content(array) for name, array in arrays.items()},
         "upward": [pair.contact.upward, pair.neumann.upward],
@@ -214,10 +213,8 @@ class Store:
     ----------
     rows : dict
         The rows that are there, by their places in the grid.
-    damaged : int
-        Number of rows whose checksum or columns are wrong; they count as missing.
-    others : dict
-        The rows of this sweep that were made under other numerics, by the version of this library.
+    plan : Plan
+        Their number, and those of the rows that are not used.
     kept : int
         Number of rows that were added.
 
@@ -232,10 +229,9 @@ class Store:
     def __init__(
         self, path: Path, start: Problem | ContactPair, grid: SweepGrid, *, fresh: bool = False, retry: bool = False
     ) -> None:
-        self.path, self.kept, self.damaged = path, 0, 0
+        self.path, self.kept = path, 0
         self.rows: dict[int, Row] = {}
-        self.others: dict[str, int] = {}
-        shared = _shared(start, NUMERICS)
+        shared = _shared(start)
         self._keys = _keys(shared, grid, start.source)
         if path.exists() and not path.is_file():
             raise StoreError(str(path), "", None, "needed the name of a file for the store (--store)")
@@ -244,13 +240,17 @@ class Store:
         try:
             with self._told():
                 self._open()
-                self._read(fresh, retry)
+                damaged = self._read(fresh, retry)
+                others: Counter[str] = Counter()
                 for numerics in range(1, NUMERICS):
-                    self._count(_keys(shared | {"numerics": numerics}, grid, start.source))
+                    others.update(self._count(_keys(shared | {"numerics": numerics}, grid, start.source)))
                 self._study = self._begin(shared, problem_of(start))
         except BaseException:
             self._file.close()
             raise
+        errors = sum(row["outcome"] == ERROR for row in self.rows.values())
+        found = {"stored": len(self.rows), "damaged": damaged, "errors": errors, "others": dict(others)}
+        self.plan = replace(_nothing_stored(start, grid, path), **found)
 
     def _open(self) -> None:
         run = self._file.execute
@@ -260,7 +260,10 @@ class Store:
         new = number == 0 and run("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0
         if not new and number != APPLICATION:
             raise sqlite3.DatabaseError("file is not a database")
-        if not new and form == FORMAT and self._schema() != sorted(_tables()):
+        tables = [table.strip() for table in TABLES.split(";") if table.strip()]  # as SQLite keeps them
+        # an index changes no answer
+        there = run("SELECT sql FROM sqlite_master WHERE type != 'index' ORDER BY sql").fetchall()
+        if not new and form == FORMAT and there != sorted((table,) for table in tables):
             raise sqlite3.DatabaseError("file is not a database")
         if not new and form != FORMAT:
             needed = f"a store of format {form}, made by another version: this one reads format {FORMAT} (--store)"
@@ -272,13 +275,9 @@ class Store:
             if new:
                 run(f"PRAGMA application_id = {APPLICATION}")
                 run(f"PRAGMA user_version = {FORMAT}")
-                for table in _tables():
+                for table in tables:
                     run(table)
         run("CREATE TEMP TABLE wanted (place INTEGER PRIMARY KEY, key BLOB NOT NULL)")
-
-    def _schema(self) -> list[str]:
-        """Return the statements that make the tables, views and triggers of the file; an index changes no answer."""
-        return sorted(row[0] for row in self._file.execute("SELECT sql FROM sqlite_master WHERE type != 'index'"))
 
     def __enter__(self) -> Store:
         return self
@@ -290,7 +289,9 @@ class Store:
                 self._file.execute("PRAGMA journal_mode = DELETE")
             self._file.close()
 
-    def _read(self, fresh: bool, retry: bool) -> None:
+    def _read(self, fresh: bool, retry: bool) -> int:
+        """Read the rows; return the number of those whose checksum or columns are wrong, which count as missing."""
+        damaged = 0
         with self._wanted(self._keys):
             for place, key, outcome, text, crc in self._file.execute(
                 "SELECT place, rows.key, outcome, CAST(row AS BLOB), crc"
@@ -298,18 +299,19 @@ class Store:
             ):
                 row = _row(key, outcome, text, crc)
                 if row is None:
-                    self.damaged += 1
+                    damaged += 1
                 elif not (fresh or (retry and outcome == ERROR)):
                     self.rows[place] = row
+        return damaged
 
-    def _count(self, keys: Sequence[bytes]) -> None:
+    def _count(self, keys: Sequence[bytes]) -> dict[str, int]:
         """Count the keys that have a row, by the version of this library that made it."""
         with self._wanted(keys):
-            for version, count in self._file.execute(
+            found = self._file.execute(
                 "SELECT version, count(*) FROM temp.wanted JOIN rows ON rows.key = wanted.key"
                 " JOIN studies ON studies.id = rows.study GROUP BY version ORDER BY version"
-            ):
-                self.others[version] = self.others.get(version, 0) + count
+            )
+            return dict(found.fetchall())
 
     def _begin(self, shared: dict[str, Any], problem: Problem | None) -> int:
         """Return the number of a study, the origin of rows, with the problem as its file has it."""
@@ -334,16 +336,6 @@ class Store:
                 values,
             )
         self.kept += len(rows)
-
-    @property
-    def errors(self) -> int:
-        """Number of the rows that ended in an error."""
-        return sum(row["outcome"] == ERROR for row in self.rows.values())
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences about rows that are there and not used, or ended in an error."""
-        return notes(self.path, self.others, self.damaged, self.errors)
 
     @contextlib.contextmanager
     def _wanted(self, keys: Sequence[bytes]) -> Iterator[None]:
@@ -383,11 +375,6 @@ class Store:
             raise StoreError(str(self.path), "", None, words) from None
 
 
-def _tables() -> list[str]:
-    """Return the statements that make the tables, as SQLite keeps them."""
-    return [table.strip() for table in TABLES.split(";") if table.strip()]
-
-
 def _row(key: object, outcome: object, text: object, crc: object) -> Row | None:
     """Return the row of a key; None if this program did not write it."""
     if not (isinstance(key, bytes) and isinstance(text, bytes) and crc == _crc(key, text)):
@@ -396,14 +383,9 @@ def _row(key: object, outcome: object, text: object, crc: object) -> Row | None:
         found = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    return found if is_row(found) and found["outcome"] == outcome else None
-
-
-def is_row(found: Any) -> bool:
-    """Return True if a value that was read from JSON has the columns of a row, each of its type and printable."""
-    if not isinstance(found, dict) or found.keys() != COLUMNS.keys() or not found["outcome"]:
-        return False
-    return all(value is None or _fits(name, value) for name, value in found.items())
+    if not isinstance(found, dict) or found.keys() != COLUMNS.keys() or found["outcome"] != outcome or not outcome:
+        return None
+    return found if all(value is None or _fits(name, value) for name, value in found.items()) else None
 
 
 def _fits(name: str, value: Any) -> bool:
@@ -420,19 +402,6 @@ def _crc(key: bytes, text: bytes) -> int:
 
 
 # --- what a sweep would make ------------------------------------------------------------------------------------------
-
-
-def notes(path: Path, others: Mapping[str, int], damaged: int, errors: int) -> tuple[str, ...]:
-    """Return sentences about rows of a store that are not used, or may not be wanted."""
-    found = [
-        f"{path}: {count} of these rows are of version {version} with other numerics; they are not used, and stay"
-        for version, count in others.items()
-    ]
-    if damaged:
-        found.append(f"{path}: {damaged} of these rows are damaged: they are made again")
-    if errors:
-        found.append(f"{path}: {errors} of these rows ended in an error and stay as they are; --retry makes them again")
-    return tuple(found)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -470,8 +439,17 @@ class Plan(Document):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences about rows of the store that would not be used, or ended in an error."""
-        return () if self.store is None else notes(self.store, self.others, self.damaged, self.errors)
+        """Sentences about rows of the store that are not used, or ended in an error."""
+        other = "are of version {} with other numerics; they are not used, and stay"
+        counts = [(count, other.format(version)) for version, count in self.others.items()]
+        counts += [(self.damaged, "are damaged: they are made again")]
+        counts += [(self.errors, "ended in an error and stay as they are; --retry makes them again")]
+        return tuple(f"{self.store}: {count} of these rows {words}" for count, words in counts if count)
+
+
+def _nothing_stored(start: Problem | ContactPair, grid: SweepGrid, store: Path | None) -> Plan:
+    units, problem = start.units or UNITS, problem_of(start)
+    return Plan(asked=len(grid), stored=0, damaged=0, store=store, units=units, problem=problem)
 
 
 def plan(
@@ -483,10 +461,7 @@ def plan(
     retry: bool = False,
 ) -> Plan:
     """Count the rows that a sweep would make; nothing is run, no store is made, and a sweep has the same errors."""
-    found = Plan(
-        asked=len(grid), stored=0, damaged=0, store=store, units=start.units or UNITS, problem=problem_of(start)
-    )
     if store is None or not store.exists():
-        return found
+        return _nothing_stored(start, grid, store)
     with Store(store, start, grid, fresh=fresh, retry=retry) as kept:
-        return replace(found, stored=len(kept.rows), damaged=kept.damaged, errors=kept.errors, others=kept.others)
+        return kept.plan

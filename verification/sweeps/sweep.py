@@ -254,7 +254,7 @@ def sweep_grid(
         grid=grid,
         places=places,
         stored=stored,
-        notes=() if kept is None else kept.notes,
+        notes=() if kept is None else kept.plan.notes,
         units=start.units or UNITS,
         problem=problem_of(start),
     )

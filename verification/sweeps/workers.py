@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import islice
 from multiprocessing import Pipe
-from typing import Any, NamedTuple
+from typing import Any
 
 from fem1d2d import mesh_files
 from ndtheory import __version__
@@ -80,13 +80,8 @@ class Origin:
     version: str = __version__
 
 
-class Handed(NamedTuple):
-    """The rows that a worker hands over, the seconds it took, and why it can make none of this problem."""
-
-    rows: Placed
-    seconds: float = 0.0
-    why: str = ""
-
+#: What a worker hands over: its rows and the seconds they took, or why it can make none of this problem.
+Handed = tuple[Placed, float] | str
 
 #: Rows share condensed bodies and the setting of BLAS: a process makes one at a time, whatever threads it has.
 _one_at_a_time = threading.Lock()
@@ -112,9 +107,8 @@ def some(origin: Origin, batch: Sequence[tuple[int, Row]]) -> Handed:
     with _one_at_a_time:
         begun, bodies = time.monotonic(), _begun(origin)
         if isinstance(bodies, str):
-            return Handed([], why=bodies)
-        rows = [(index, row(origin.start, values, bodies)) for index, values in batch]
-        return Handed(rows, time.monotonic() - begun)
+            return bodies
+        return [(index, row(origin.start, values, bodies)) for index, values in batch], time.monotonic() - begun
 
 
 class Batches:
@@ -143,12 +137,13 @@ class Batches:
         NoWorkers
             The worker has another version of this library, or cannot read a mesh file.
         """
-        if handed.why:
-            raise NoWorkers("worker", handed.why)
+        if isinstance(handed, str):
+            raise NoWorkers("worker", handed)
+        rows, seconds = handed
         # the last batches count most: another mesh takes another time
-        self._rows, self._seconds = self._rows / 2 + len(handed.rows), self._seconds / 2 + handed.seconds
+        self._rows, self._seconds = self._rows / 2 + len(rows), self._seconds / 2 + seconds
         self._at_once = max(1, min(self._most, int(SECONDS * self._rows / max(self._seconds, 1e-9))))
-        return handed.rows
+        return rows
 
 
 # --- processes of this machine ----------------------------------------------------------------------------------------

@@ -13,8 +13,8 @@ from strategies import AT_NIGHT
 
 from verification import ledger
 
-#: One computed exactly, one searched on random problems, one seen at solutions.
-FEW = SOME if AT_NIGHT else ["C5", "4.8", SEEN]
+#: One computed exactly, one seen at solutions; at night one searched on random problems, too.
+FEW = SOME if AT_NIGHT else ["C5", SEEN]
 
 HEAVY = ["numpy", "scipy", "matplotlib", "cvxpy", "clarabel", "rich", "sympy"]
 
@@ -98,7 +98,8 @@ def test_ctrl_c_while_files_are_written_keeps_the_result_that_was_shown(call, ke
     assert READ in answer.out
 
 
-@pytest.mark.parametrize("arguments", [[READ], *[[READ, "--json"], ["--help"]] * AT_NIGHT], ids=" ".join)
+@pytest.mark.skipif(not AT_NIGHT, reason="by day another command has the reader that goes away")
+@pytest.mark.parametrize("arguments", [[READ], [READ, "--json"], ["--help"]], ids=" ".join)
 def test_a_reader_that_goes_away_is_no_crash(arguments):
     reader, writer = os.pipe()
     os.close(reader)

@@ -51,18 +51,18 @@ def known_draws(monkeypatch):
 
 @pytest.mark.parametrize("rule", RULES.values(), ids=list(RULES))
 def test_a_registered_rule_passes_and_the_rate_of_momentum_is_attained(rule):
-    found = check_rule(rule, examples=4 if rule.name == "momentum" else 3)
+    found = check_rule(rule, examples=4 if rule.name == "momentum" else 3 if AT_NIGHT else 1)
     assert found["keeps its proved rate"].verdict == ("attained" if rule.name == "momentum" else "not asked")
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=list(LAWS))
 def test_a_registered_law_passes(law):
-    check_law(law.of(Fraction(3, 10)), examples=8)
+    check_law(law.of(Fraction(3, 10)), examples=8 if AT_NIGHT else 3)
 
 
 @pytest.mark.parametrize("bound", BOUNDS.values(), ids=list(BOUNDS))
 def test_a_registered_bound_passes(bound):
-    check_bound(bound, examples=2 if not bound.calculated else 5 if AT_NIGHT else 3)
+    check_bound(bound, examples=(5 if bound.calculated else 2) if AT_NIGHT else 1)
 
 
 MATRICES = {
@@ -82,8 +82,7 @@ def step_of(pair):
     return lambda g: turn(pair.interface.carry_back(T(turn(g))[1].force))
 
 
-@pytest.mark.parametrize("neumann_body", [1, 2])
-@pytest.mark.parametrize("friction", [0, 0.1, 1])
+@pytest.mark.parametrize(("neumann_body", "friction"), [(1, 0), (2, 0.1), (1, 1)])
 def test_the_step_of_this_project_passes_with_its_loads_and_without_them(neumann_body, friction):
     given = MATRICES | {"friction": friction, "neumann_body": neumann_body}
     pair = vf.build(**given)

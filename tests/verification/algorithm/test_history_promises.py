@@ -33,8 +33,15 @@ def on_nodes(body, vector, sign):
     return found.ravel()
 
 
-@pytest.mark.parametrize("name", ["one grid", "other roles", "grids that differ", "gap"])
-@pytest.mark.parametrize("method", ["iteration", "monolithic"])
+@pytest.mark.parametrize(
+    ("method", "name"),
+    [
+        ("iteration", "one grid"),
+        ("monolithic", "other roles"),
+        ("iteration", "grids that differ"),
+        ("monolithic", "gap"),
+    ],
+)
 def test_the_work_of_the_loads_is_the_change_of_energy_and_what_the_contact_takes(method, name):
     data = problem(**VARIANTS[name]).to_dict()
     data["iteration"]["tolerance"] = 1e-13

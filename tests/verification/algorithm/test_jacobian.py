@@ -13,6 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pieces import Evaluated, along_a_run, assert_affine, at_solution, forces, held, seeds
 from problem_list import PROBLEMS, bars
+from sample_runs import by_name
 
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
@@ -27,8 +28,8 @@ def test_the_derivatives_of_a_piece_are_differences_of_T_over_a_step_inside_it(d
     assume(assert_affine(pair, forces(pair, random), random))
 
 
-@pytest.mark.parametrize("count", [0, 1, 5])
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("count", [0, 1, 5] if strategies.AT_NIGHT else [0, 5])
+@by_name
 def test_T_is_affine_around_the_iterates_of_a_run(name, count):
     """With the local law, with contact nodes held, at a kernel that sees single nodes, for bars."""
     pair = pair_from(vf.Problem.from_dict(PROBLEMS[name]))

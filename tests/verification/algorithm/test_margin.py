@@ -12,6 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pieces import Evaluated, assert_affine, at_solution, held
 from problem_list import PROBLEMS, blocks
+from sample_runs import by_name
 
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
@@ -77,14 +78,14 @@ def assert_margin(pair: ContactPair, random: np.random.Generator) -> bool:
     return True
 
 
-@strategies.fewer(2)
+@strategies.fewer(4)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_within_the_margin_no_node_changes_its_state_and_just_beyond_it_one_does(seed):
     pair, _, _, random = case(seed)
     assume(assert_margin(pair, random))
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+@by_name
 def test_the_margin_is_that_of_the_sample_problems_too(name):
     """With the local law, with contact nodes held, for bars."""
     assert assert_margin(pair_from(vf.Problem.from_dict(PROBLEMS[name])), np.random.default_rng(0))

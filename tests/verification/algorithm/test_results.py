@@ -48,16 +48,37 @@ def results(problem) -> dict[str, Document]:
     }
 
 
-NAMES = ["Measured", "Run", "Solution", "Comparison", "Advice", "Plane"]
+#: By the kind of result, a title of its view.
+TITLES = {
+    "Measured": "WHICH CONSTANTS DOES THE THEOREM USE?",
+    "Run": "WHAT HAPPENED",
+    "Solution": "WHAT IS THE SOLUTION?",
+    "Comparison": "DOES THE RUN AGREE WITH THE BOUND?",
+    "Advice": "WHICH BODY GETS THE NEUMANN PROBLEM?",
+    "Plane": "WHERE IS ONE STEP PROVED TO CONTRACT?",
+}
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_result_that_was_pickled_or_copied_tells_the_same(results, name):
+@pytest.mark.parametrize("name", TITLES)
+def test_a_result_is_pickled_and_shown_on_one_line_in_a_notebook_and_a_figure_and_has_its_problem(
+    results, problem, name
+):
     result = results[name]
     for other in (pickle.loads(pickle.dumps(result)), copy.copy(result), copy.deepcopy(result)):
         assert type(other) is type(result)
         assert other.to_json() == result.to_json()
         assert repr(other) == repr(result)
+    shown, view, figure = repr(result), result._repr_html_(), result.plot()
+    assert shown.startswith(f"<{name}: ")
+    assert "\n" not in shown
+    assert len(shown) < 300
+    assert TITLES[name] in view
+    assert "Next: ndtheory" not in view  # there is no file to name
+    assert "\x1b" not in view
+    drawn = figure.axes[0]
+    assert drawn.get_xlabel() or drawn.get_title() or len(figure.axes) > 1
+    assert drawn.lines or drawn.collections
+    assert vf.Problem.from_dict(json.loads(result.to_json())["problem"]) == problem
 
 
 def test_a_problem_and_a_pair_are_pickled_and_run_to_the_same_result(problem):
@@ -123,14 +144,6 @@ def test_no_array_that_is_handed_on_can_be_written(results, problem):
         run.last.g[0] = 1.0
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_result_is_shown_on_one_line(results, name):
-    shown = repr(results[name])
-    assert shown.startswith(f"<{name}: ")
-    assert "\n" not in shown
-    assert len(shown) < 300
-
-
 def test_what_a_result_holds_is_shown_on_one_line_too(results, problem):
     pair, run = vf.build(problem), results["Run"]
     shown = [repr(each) for each in (pair, pair.contact, pair.contact.grid, pair.contact.body, pair.interface)]
@@ -149,22 +162,6 @@ def test_showing_a_result_computes_nothing(problem, monkeypatch):
     assert "linearise()" in document["reason"]["linearised_rate"]
     assert repr(run)
     assert "WHAT HAPPENED" in run._repr_html_()
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_notebook_shows_what_the_screen_shows(results, name):
-    questions = {
-        "Measured": "WHICH CONSTANTS DOES THE THEOREM USE?",
-        "Run": "WHAT HAPPENED",
-        "Solution": "WHAT IS THE SOLUTION?",
-        "Comparison": "DOES THE RUN AGREE WITH THE BOUND?",
-        "Advice": "WHICH BODY GETS THE NEUMANN PROBLEM?",
-        "Plane": "WHERE IS ONE STEP PROVED TO CONTRACT?",
-    }
-    view = results[name]._repr_html_()
-    assert questions[name] in view
-    assert "Next: ndtheory" not in view  # there is no file to name
-    assert "\x1b" not in view
 
 
 def test_what_did_not_converge_is_called_no_solution_in_every_view(results, problem):
@@ -189,14 +186,6 @@ def test_what_has_no_screen_is_shown_as_its_document():
     S = np.diag([2.0, 3.0])
     run = vf.run(vf.build(S1=S, S2=np.eye(2), load2=np.array([0.0, -1.0]), x=np.array([0.0])))
     assert "ndtheory.run/1" in run._repr_html_()
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_every_result_has_a_figure(results, name):
-    figure = results[name].plot()
-    drawn = figure.axes[0]
-    assert drawn.get_xlabel() or drawn.get_title() or len(figure.axes) > 1
-    assert drawn.lines or drawn.collections
 
 
 def test_what_has_nothing_to_draw_says_so(problem):
@@ -236,12 +225,6 @@ def test_tables_are_plain_columns_of_one_length(results):
     assert {len(column) for column in contact.values()} == {7}
     assert contact["pressure"] == run.contact.pressure.tolist()
     json.dumps([table, contact])  # nothing but numbers and texts
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_every_document_carries_its_problem(results, problem, name):
-    document = json.loads(results[name].to_json())
-    assert vf.Problem.from_dict(document["problem"]) == problem
 
 
 def test_at_another_friction_a_document_carries_that_friction(problem):

@@ -10,6 +10,8 @@ from verification.bounds.bound import NOT_ASKED
 from verification.bounds.table import chosen
 from verification.registry import BOUNDS, PROOFS, Prover
 
+pytestmark = pytest.mark.usefixtures("known_bounds")
+
 PROBLEM = vf.Problem.from_dict(small())
 QUICK = ("printed", "repaired", "energy")
 KNOWN = ", ".join(BOUNDS)

@@ -7,7 +7,7 @@ from problem_list import small
 import verification as vf
 from verification import figures
 from verification.bounds.table import certifying
-from verification.output.folder import Folder
+from verification.output.report import report
 from verification.registry import BOUNDS, LAWS, RULES
 from verification.sweeps import region
 from verification.sweeps.grid import SweepGrid
@@ -37,9 +37,9 @@ def legend(figure):
 
 
 @pytest.fixture
-def compared(registered):
+def compared(registered, shared):
     registered(Halfway(), Silent(), Slow())
-    return vf.compare(PROBLEM)
+    return shared("three bounds are registered", lambda: vf.compare(PROBLEM))
 
 
 def test_a_registered_bound_is_worked_out_judged_and_written(compared):
@@ -84,10 +84,9 @@ def test_a_registered_bound_that_is_violated_is_a_fault_unless_it_is_a_finding(r
     assert found.proved_violated == fault
 
 
-def test_it_is_drawn_beside_the_residuals_and_stands_in_the_report(compared, tmp_path):
+def test_it_is_drawn_beside_the_residuals_and_stands_in_the_report(compared):
     assert {"halfway bound", "slow bound", "energy bound"} <= set(legend(compared.plot()))
-    Folder(tmp_path, "compare").write(compared)
-    page = (tmp_path / "report.html").read_text("utf-8")
+    page = report(compared, {})
     assert all(f'<th scope="row">{name}</th>' in page for name in ("halfway", "silent", "slow"))
 
 

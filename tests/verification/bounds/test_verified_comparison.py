@@ -24,18 +24,18 @@ from verification.semidefinite.multipliers import QuadraticForms
 SMALL = vf.Problem.from_dict(small())
 
 
-@pytest.fixture(scope="module")
-def compared(shared):
+@pytest.fixture
+def compared(shared, known_bounds):
     return lambda name, problem: shared(("verified comparison", name), lambda: vf.compare(problem(), verified=True))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def whole(compared):
     return compared("small", lambda: SMALL)
 
 
-@pytest.fixture(scope="module")
-def plain(shared):
+@pytest.fixture
+def plain(shared, known_bounds):
     return shared("plain comparison", lambda: vf.compare(SMALL))
 
 

@@ -11,6 +11,7 @@ import scipy.sparse.linalg
 import sympy
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import AT_NIGHT, fewer
 
 import verification as vf
 from fem1d2d import plane_strain, rectangle, stiffness
@@ -19,7 +20,7 @@ from ndtheory.continuum.calibration import loss
 from ndtheory.continuum.intervals import Interval
 from ndtheory.continuum.rectangles import continuum_constants, friction_threshold, statement
 from verification.certificate import calibrating, continuum
-from verification.certificate.continuum import bounded, two_rectangles
+from verification.certificate.continuum import two_rectangles
 
 KAPPA = F(9, 5)
 CONTACT, NEUMANN = (F(4), F(0), F(4)), (F(20, 3), F(4, 3), F(16, 3))
@@ -29,13 +30,13 @@ BODIES = [(*CONTACT, "0.3"), (*NEUMANN, "0.3"), (F(3, 2), F(1, 2), F(3, 2), "0.4
 
 
 @pytest.fixture(scope="module")
-def tracing():
-    return calibrating.for_traces(*CONTACT, KAPPA)
+def tracing(shared):
+    return shared(("for_traces", *CONTACT, KAPPA), lambda: calibrating.for_traces(*CONTACT, KAPPA))
 
 
 @pytest.fixture(scope="module")
-def cutting():
-    return calibrating.for_cut_off(*NEUMANN, KAPPA)
+def cutting(shared):
+    return shared(("for_cut_off", *NEUMANN, KAPPA), lambda: calibrating.for_cut_off(*NEUMANN, KAPPA))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +55,11 @@ def test_the_identity_of_a_calibration_holds_for_polynomials():
     w = (x**2 * y - 3 * y + 1, x * y**2 + 2 * x - y)
     cubic = (1 + x * y, x - 2 * y**2, 3 + y, x**2 - y)  # xxx, xxy, xyy, yyy
     M = [[[cubic[i + j + k] for k in range(2)] for j in range(2)] for i in range(2)]
-    whole = lambda f: sympy.integrate(sympy.expand(f), (x, 0, length), (y, 0, 1))
+    over = lambda f, *ends: sum(
+        c * sympy.prod(end ** (n + 1) / (n + 1) for n, (_, end) in zip(powers, ends, strict=True))
+        for powers, c in sympy.Poly(f, *(axis for axis, _ in ends)).terms()
+    )
+    whole = lambda f: over(f, (x, sympy.Integer(length)), (y, sympy.Integer(1)))
 
     def strain(s):  # C^-1 for G = 1
         trace = s[0][0] + s[1][1]
@@ -78,8 +83,8 @@ def test_the_identity_of_a_calibration_holds_for_polynomials():
         for j in range(2)
     ]
     flux = [sum(M[i][j][k] * w[j] * w[k] for j, k in pairs) for i in range(2)]
-    border = sympy.integrate(sympy.expand(flux[0].subs(x, length) - flux[0].subs(x, 0)), (y, 0, 1))
-    border += sympy.integrate(sympy.expand(flux[1].subs(y, 1) - flux[1].subs(y, 0)), (x, 0, length))
+    border = over(flux[0].subs(x, length) - flux[0].subs(x, 0), (y, sympy.Integer(1)))
+    border += over(flux[1].subs(y, 1) - flux[1].subs(y, 0), (x, sympy.Integer(length)))
     inside = whole(energy(rest)) + whole(sum(R[j][k] * w[j] * w[k] for j, k in pairs))
     assert sympy.simplify(whole(energy(e)) - inside - border) == 0
 
@@ -92,27 +97,28 @@ def least_by_differences(proof, columns=None):
     rng, step, nu = np.random.default_rng(3), 1e-6, 0.3
     x, y = (np.array(line, float) for line in (proof.x, proof.y))
     N = np.array([[[float(v) for v in cubic] for cubic in line] for line in proof.nodes])
+    i, j = (
+        index.ravel() for index in np.meshgrid(range(len(x) - 1) if columns is None else columns, range(len(y) - 1))
+    )
+    at, depth = (
+        x[i] + np.diff(x)[i] * rng.uniform(0.01, 0.99, i.shape),
+        y[j] + np.diff(y)[j] * rng.uniform(0.05, 0.95, i.shape),
+    )
 
-    def M(at, depth, i, j):
-        s, t = (at - x[i]) / (x[i + 1] - x[i]), (depth - y[j]) / (y[j + 1] - y[j])
+    def M(at, depth):
+        s, t = (((value - line[n]) / np.diff(line)[n])[:, None] for value, line, n in ((at, x, i), (depth, y, j)))
         lower, upper = (N[i, n] * (1 - s) + N[i + 1, n] * s for n in (j, j + 1))
-        return (lower * (1 - t) + upper * t) / depth
+        return (lower * (1 - t) + upper * t) / depth[:, None]
 
-    least = np.inf
-    for i in range(len(x) - 1) if columns is None else columns:
-        width = x[i + 1] - x[i]
-        for j, height in enumerate(np.diff(y)):
-            at, depth = x[i] + width * rng.uniform(0.01, 0.99), y[j] + height * rng.uniform(0.05, 0.95)
-            along = (M(at + step, depth, i, j) - M(at - step, depth, i, j)) / (2 * step)
-            across = (M(at, depth + step, i, j) - M(at, depth - step, i, j)) / (2 * step)
-            here = M(at, depth, i, j)
-            divergence = [[along[p + q] + across[p + q + 1] for q in range(2)] for p in range(2)]
-            stress = [np.array([[here[k], here[k + 1]], [here[k + 1], here[k + 2]]]) for k in range(2)]
-            product = lambda s, t: (np.sum(s * t) - nu * np.trace(s) * np.trace(t)) / 2
-            R = -np.array(divergence) - [[product(s, t) for t in stress] for s in stress]
-            R -= float(proof.beta[i]) * np.diag([3.5, 1.0])
-            least = min(least, np.linalg.eigvalsh(R * depth**2)[0])
-    return least
+    along = (M(at + step, depth) - M(at - step, depth)) / (2 * step)
+    across = (M(at, depth + step) - M(at, depth - step)) / (2 * step)
+    once = np.array([[0, 1], [1, 2]])
+    stress = M(at, depth)[:, [once, once + 1]]
+    trace = np.trace(stress, axis1=2, axis2=3)
+    products = np.einsum("cpab,cqab->cpq", stress, stress) - nu * trace[:, :, None] * trace[:, None]
+    R = -(along[:, once] + across[:, once + 1]) - products / 2
+    R -= np.array(proof.beta, float)[i, None, None] * np.diag([3.5, 1.0])
+    return np.linalg.eigvalsh(R * (depth**2)[:, None, None]).min()
 
 
 def test_the_conditions_hold_at_points_of_every_cell_by_differences(tracing, cutting):
@@ -157,7 +163,7 @@ def test_no_field_has_less_energy_than_is_proved(tracing, cutting, numbers, wave
     assert proved <= total * (1 + 1e-9) + 1e-12
 
 
-def meshed(length, poisson, rows=12):
+def meshed(length, poisson, rows=6):
     """Stiffness on a mesh of a rectangle with d = G = 1, clamped below; its points, and which numbers are free."""
     mesh = rectangle((0.0, float(length)), (0.0, 1.0), (round(float(length) * rows), rows))
     points = np.asarray(mesh.points)
@@ -179,7 +185,7 @@ def weighted(mesh, along, across, size):
 
 
 def test_no_mesh_beats_the_weights_beside_gamma_c_and_one_comes_near(cutting):
-    mesh, A, free = meshed(NEUMANN[0], 0.3, rows=6)
+    mesh, A, free = meshed(NEUMANN[0], 0.3)
     middles = np.asarray(mesh.points)[np.asarray(mesh.cells)][:, :, 0].mean(1)
     beta = np.array(cutting.beta, float)[np.searchsorted(np.array(cutting.x, float), middles) - 1]
     B = weighted(mesh, 3.5 * beta, beta, A.shape[0])
@@ -188,10 +194,11 @@ def test_no_mesh_beats_the_weights_beside_gamma_c_and_one_comes_near(cutting):
     assert 0.5 < largest <= 1  # the columns of the mesh are not those of the grid, whose beta falls towards the side
 
 
-@pytest.mark.parametrize(("length", "lo", "hi", "poisson"), BODIES)
-def test_no_mesh_shows_a_larger_tangential_trace_than_a_calibration(length, lo, hi, poisson):
-    proof = calibrating.for_traces(length, lo, hi, 3 - 4 * F(poisson))
-    mesh, A, free = meshed(length, float(poisson))
+@pytest.mark.parametrize(("length", "lo", "hi", "poisson"), BODIES if AT_NIGHT else [*BODIES[:2], BODIES[3]])
+def test_no_mesh_shows_a_larger_tangential_trace_than_a_calibration(length, lo, hi, poisson, shared):
+    body = length, lo, hi, 3 - 4 * F(poisson)
+    proof = shared(("for_traces", *body), lambda: calibrating.for_traces(*body))
+    mesh, A, free = meshed(length, float(poisson), rows=6 if length > 2 else 12)
     points = np.asarray(mesh.points)
     top = np.flatnonzero((points[:, 1] > 1 - 1e-9) & (points[:, 0] >= lo - 1e-9) & (points[:, 0] <= hi + 1e-9))
     top = top[np.argsort(points[top, 0])]
@@ -219,7 +226,7 @@ def test_the_loss_is_attained_where_a_lift_is_a_hyperbolic_cosine():
 
 
 def test_the_cut_off_costs_every_lift_of_a_mesh_less_than_is_proved(cutting):
-    mesh, A, free = meshed(NEUMANN[0], 0.3, rows=6)
+    mesh, A, free = meshed(NEUMANN[0], 0.3)
     points = np.asarray(mesh.points)
     ends = np.array(cutting.x, float)
     run = np.r_[0, np.cumsum(np.sqrt(np.array(cutting.beta, float)) * np.diff(ends))]
@@ -256,6 +263,7 @@ def test_a_weight_that_grows_by_a_twentieth_is_no_longer_proved(tracing, cutting
             replace(proof, **{which: grown})
 
 
+@fewer(2)
 @given(st.data())
 def test_a_field_that_is_changed_at_a_node_is_refused_unless_its_conditions_hold(tracing, data):
     i, j, p = (data.draw(st.integers(0, most)) for most in (len(tracing.x) - 1, len(tracing.y) - 1, 3))
@@ -297,8 +305,8 @@ def test_calibrations_of_another_body_are_refused(section6, tracing):
 # --- what follows ---
 
 
-def test_section_6_contracts_in_the_continuum_at_the_friction_and_the_theta_of_the_paper(section6):
-    constants, closed = bounded(section6), continuum_constants(section6)
+def test_section_6_contracts_in_the_continuum_at_the_friction_and_the_theta_of_the_paper(section6, known_continuum):
+    constants, closed = continuum.bounded(section6), continuum_constants(section6)
     says = statement(constants, friction="0.2", theta="0.6")
     assert (says.verdict, says.factor.level) == ("contraction", "guaranteed")
     assert says.factor.hi < 0.7917
@@ -322,6 +330,7 @@ def test_a_solver_that_fails_leaves_the_closed_forms(section6, monkeypatch):
         x = float("nan")
 
     monkeypatch.setattr(calibrating.clarabel, "DefaultSolver", Failed)
+    monkeypatch.setattr(calibrating, "ROOMS", calibrating.ROOMS[-1:])
     for name in ("for_traces", "for_cut_off"):
         monkeypatch.setattr(continuum, name, getattr(calibrating, name).__wrapped__)  # not what the cache holds
-    assert bounded(section6) == continuum_constants(section6)
+    assert continuum.bounded(section6) == continuum_constants(section6)

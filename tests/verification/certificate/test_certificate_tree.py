@@ -80,18 +80,24 @@ def test_the_certificates_of_these_tests_have_cases_of_every_kind(divided):
 
 
 #: A built-in problem and its theta, or the seed of a random one: those that take most sets among the first 44.
-CLOSE_TO = [("section6-60", "0.7"), 23, 27, 24, 10, 38, 5, 16, ("section6", "0.4"), ("section6", "0.7")]
+CLOSE_TO = [("section6-60", "0.7"), 27, 23, 24, 10, 38, 5, 16, ("section6", "0.4"), ("section6", "0.7")]
 
 
-@pytest.mark.parametrize("problem", CLOSE_TO if AT_NIGHT else CLOSE_TO[:3], ids=str)
+@pytest.mark.parametrize("problem", CLOSE_TO if AT_NIGHT else CLOSE_TO[:2], ids=str)
 def test_the_proved_factor_is_within_1_2_per_cent_of_the_attained_one(problem):
     if isinstance(problem, tuple):
-        found = vf.certify(vf.example(problem[0]), theta=problem[1], exact=True)
+        data, theta = vf.example(problem[0]), problem[1]
     else:
         generator = np.random.default_rng(problem)
-        drawn = random_problem(generator, matching=bool(problem % 3))
-        theta = relaxation_factor(generator, vf.measure(drawn).rho_max.value)
-        found = vf.certify(drawn, theta=str(theta), exact=True)
+        data = random_problem(generator, matching=bool(problem % 3))
+        theta = str(relaxation_factor(generator, vf.measure(data).rho_max.value))
+    found = vf.certify(data, theta=theta, exact=True)
+    if problem == 27:  # one set of all pieces does not do it
+        with pytest.raises(
+            NoCertificate, match=r"bound of the factor is 1\.22\d, the largest factor found 0\.592.*exact"
+        ):
+            vf.certify(data, theta=theta)
+        assert found.factor < Fraction(6, 10)
     assert found.lower * (1 - 1e-12) <= float(found.factor) <= 1.012 * found.lower
     assert check_again(json.loads(found.to_json())).accepted
 
@@ -114,45 +120,9 @@ def tampered(claim, draw, largest):
     return claim
 
 
-def another_case(inner, leaf, other, draw):
-    inner["cases"][draw.randrange(len(inner["cases"]))] = other
-
-
-def the_same_case_twice(inner, leaf, other, draw):
-    inner["cases"] = [copy.deepcopy(draw.choice(inner["cases"]))] * 2
-
-
-def one_case_left_out(inner, leaf, other, draw):
-    inner["cases"].pop(draw.randrange(len(inner["cases"])))
-
-
-def a_third_case(inner, leaf, other, draw):
-    inner["cases"].append(other)
-
-
-def cases_exchanged(inner, leaf, other, draw):
-    inner["cases"].reverse()
-
-
-def divided_otherwise(inner, leaf, other, draw):
-    inner["divided"] = draw.choice(["signs", "normal", "slip", "Normal", None, ""])
-
-
-def at_another_node(inner, leaf, other, draw):
-    inner["node"] = draw.choice([0, 1, 2, -1, True, 1.0, "0", None, [0]])
-
-
-def not_divided(inner, leaf, other, draw):
-    inner.clear()
-    inner.update(other)
-
-
-def divided_once_more(inner, leaf, other, draw):
-    own = copy.deepcopy(leaf)
-    leaf.clear()
-    leaf.update(
-        {"divided": draw.choice(["signs", "normal", "slip"]), "node": draw.randint(0, 2), "cases": [own, other]}
-    )
+def become(tree, other):
+    tree.clear()
+    tree.update(other)
 
 
 def other_multipliers(inner, leaf, other, draw):
@@ -177,17 +147,21 @@ def equations_added_or_left_out(inner, leaf, other, draw):
         values.append(draw.choice(["0", "1", "-1000", "100000000", 1, None]))
 
 
+KINDS = ["signs", "normal", "slip"]
+
+#: Changes of a division, of any subtree, by another one that may take its place.
 CHANGES = [
-    another_case,
-    another_case,
-    the_same_case_twice,
-    one_case_left_out,
-    a_third_case,
-    cases_exchanged,
-    divided_otherwise,
-    at_another_node,
-    not_divided,
-    divided_once_more,
+    *[lambda inner, leaf, other, draw: inner["cases"].__setitem__(draw.randrange(len(inner["cases"])), other)] * 2,
+    lambda inner, leaf, other, draw: inner.update(cases=[copy.deepcopy(draw.choice(inner["cases"]))] * 2),
+    lambda inner, leaf, other, draw: inner["cases"].pop(draw.randrange(len(inner["cases"]))),
+    lambda inner, leaf, other, draw: inner["cases"].append(other),
+    lambda inner, leaf, other, draw: inner["cases"].reverse(),
+    lambda inner, leaf, other, draw: inner.update(divided=draw.choice([*KINDS, "Normal", None, ""])),
+    lambda inner, leaf, other, draw: inner.update(node=draw.choice([0, 1, 2, -1, True, 1.0, "0", None, [0]])),
+    lambda inner, leaf, other, draw: become(inner, other),
+    lambda inner, leaf, other, draw: become(
+        leaf, {"divided": draw.choice(KINDS), "node": draw.randint(0, 2), "cases": [copy.deepcopy(leaf), other]}
+    ),
     other_multipliers,
     one_multiplier,
     equations_added_or_left_out,
@@ -277,15 +251,6 @@ def test_a_tree_that_is_none_is_refused_with_what_is_needed(edit, said, divided)
     found = check_again(document)
     assert not found.accepted
     assert said in found.why
-
-
-def test_dividing_the_pieces_proves_contraction_where_one_set_does_not():
-    generator = np.random.default_rng(27)
-    drawn = random_problem(generator, matching=False)
-    theta = str(relaxation_factor(generator, vf.measure(drawn).rho_max.value))
-    with pytest.raises(NoCertificate, match=r"bound of the factor is 1\.22\d, the largest factor found 0\.592.*exact"):
-        vf.certify(drawn, theta=theta)
-    assert vf.certify(drawn, theta=theta, exact=True).factor < Fraction(6, 10)
 
 
 def test_only_the_semidefinite_bound_divides():

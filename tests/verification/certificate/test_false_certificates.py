@@ -43,7 +43,7 @@ def records(benchmark, problems, seed=0):
 
 
 def test_no_certificate_that_is_accepted_is_false(benchmark):
-    problems = 200 if AT_NIGHT else 3
+    problems = 200 if AT_NIGHT else 2
     counts, false = records(benchmark, problems)
     assert false == []
     assert counts["problems"] == problems

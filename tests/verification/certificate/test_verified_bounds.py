@@ -13,11 +13,11 @@ import scipy.sparse as sp
 from flint import fmpz_mat
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import AT_NIGHT
+from strategies import AT_NIGHT, fewer
 
 from fem1d2d import bar, element, interval, plane_strain, rectangle
 from fem1d2d.proofs import exact
-from fem1d2d.proofs.enclosed import Enclosed, gamma
+from fem1d2d.proofs.enclosed import Enclosed
 from fem1d2d.proofs.exact import Shapes, fractions
 from fem1d2d.proofs.loewner import Elimination, positive_definite
 from fem1d2d.proofs.proved import enclose_largest, inverse, root
@@ -33,7 +33,7 @@ KINDS = (
 )
 
 #: Random pencils among which some false bound is found.
-MISJUDGED = 400 if AT_NIGHT else 200
+MISJUDGED = 400 if AT_NIGHT else 120
 
 sizes = st.fractions(min_value=F(1, 1000), max_value=1000, max_denominator=1000)
 whole = st.integers(-20, 20)
@@ -85,7 +85,7 @@ def test_the_exact_pivots_tell_a_definite_matrix_from_an_indefinite_and_a_singul
 def test_the_exact_pivots_are_ratios_of_minors(near_singular):
     """The determinants are those of another library."""
     draw, singular = random.Random(1), 0
-    for _ in range(200):
+    for _ in range(200 if AT_NIGHT else 100):
         K = near_singular.Case.drawn(draw).K
         minors = [1] + [int(fmpz_mat([row[:k] for row in K[:k]]).det()) for k in range(1, len(K) + 1)]
         signs = [
@@ -94,12 +94,12 @@ def test_the_exact_pivots_are_ratios_of_minors(near_singular):
         ]
         assert near_singular.pivots(K) == signs
         singular += not minors[-1]
-    assert 20 < singular < 180
+    assert 10 < singular < 90
 
 
 def test_a_double_beside_an_eigenvalue_that_is_known_exactly_decides_which_claim_is_true(near_singular):
     draw, known = random.Random(2), 0
-    for _ in range(400):
+    for _ in range(400 if AT_NIGHT else 200):
         case = near_singular.Case.drawn(draw)
         above = lambda steps, of=case: near_singular.definite(
             near_singular.combined(of.side, of.A, -of.side, of.times(near_singular.moved(of.shift, -of.side * steps)))
@@ -107,7 +107,7 @@ def test_a_double_beside_an_eigenvalue_that_is_known_exactly_decides_which_claim
         if above(1) and not above(0):  # the least or the largest eigenvalue lies at lambda, or within one double of it
             known += int(fmpz_mat(case.K).det()) == 0
             assert not above(-1)
-    assert known > 50
+    assert known > 25
 
 
 # --- ends that are rounded outwards --------------------------------------------------------------------------------
@@ -142,27 +142,6 @@ def test_a_form_lies_between_its_ends_for_dense_and_sparse_matrices(rows, x):
         assert F(low) < truth < F(high)
 
 
-@given(st.lists(sizes, min_size=8, max_size=8))
-def test_products_and_sums_of_enclosed_matrices_hold_those_of_the_exact_ones(entries):
-    a, b = np.array(entries[:4], dtype=object).reshape(2, 2), np.array(entries[4:], dtype=object).reshape(2, 2)
-    A, B = Enclosed.rounded(a), Enclosed.rounded(b)
-    for found, truth in ((A.times(B), a @ b), (A.plus(-0.3, B, factor=1.7), F(1.7) * a - F(0.3) * b)):
-        assert (abs(truth - fractions(found.middle)) <= fractions(found.radius)).all()
-
-
-def test_the_bound_of_n_roundings_is_rounded_upwards():
-    for n in (1, 2, 3, 10, 1000, 10**6):
-        exactly = F(n, 2**53) / (1 - F(n, 2**53))
-        assert exactly < F(gamma(n)) < exactly * (1 + F(1, 10**14))
-
-
-def test_matrices_of_doubles_are_no_exact_ones():
-    with pytest.raises(TypeError, match="needed rationals"):
-        Enclosed.rounded(np.array([[0.5]]))
-    with pytest.raises(ValueError, match="ordinary size"):
-        Enclosed.rounded(np.array([[F(1, 10**200)]], dtype=object))
-
-
 # --- what is proved is proved where it can be ------------------------------------------------------------------------
 
 
@@ -183,12 +162,6 @@ def test_the_schur_complement_of_a_chain_of_springs_lies_between_close_bounds(n,
     low, high = eliminated.bound(1)[0, 0], eliminated.bound(-1)[0, 0]
     assert F(low) < F(1, n + 1) < F(high)
     assert high - low < 1e-14 * n**2
-
-
-def test_a_matrix_that_is_not_finite_proves_nothing():
-    with np.errstate(invalid="ignore"):
-        assert not positive_definite(Enclosed.exactly(np.array([[np.nan]])))
-        assert not positive_definite(Enclosed.exactly(np.array([[np.inf]])))
 
 
 def test_a_pencil_without_a_definite_second_matrix_has_no_bounds():
@@ -228,6 +201,7 @@ def within(found, truth):
     assert (radius <= 1e-14 * abs(truth).max()).all()
 
 
+@fewer(6)
 @given(sizes, sizes, sizes, st.fractions(0, F(49, 100), max_denominator=100), sizes)
 def test_matrices_of_a_rectangle_are_the_exact_ones_within_their_radius(width, height, young, poisson, length):
     mesh, material = rectangle((F(0), width), (-height, F(0)), (2, 3)), plane_strain(young, poisson)

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from fractions import Fraction as F
+from functools import cache
 
 import numpy as np
 import precise_oracle
@@ -51,6 +52,11 @@ SWAPPED = {"iteration": {"neumann_body": 2}}
 TABLES = {"matching": MATCHING, "swapped": SWAPPED, "apart": APART, "finer": FINER}
 
 
+@cache
+def verified(name="matching"):
+    return vf.measure(changed(**TABLES[name]), verified=True)
+
+
 @pytest.fixture(scope="module")
 def exactly(shared):
     """``exactly(name)``: the constants of a problem with 40 digits, worked out once."""
@@ -60,7 +66,7 @@ def exactly(shared):
 
 @pytest.mark.parametrize("name", TABLES)
 def test_every_constant_with_40_digits_lies_between_its_bounds(name, exactly):
-    measured, truth = vf.measure(changed(**TABLES[name]), verified=True), exactly(name)
+    measured, truth = verified(name), exactly(name)
     assert measured.unverified == {}
     for constant in NAMES:
         number = getattr(measured, constant)
@@ -73,7 +79,7 @@ def test_every_constant_with_40_digits_lies_between_its_bounds(name, exactly):
 
 
 def test_the_bounds_of_each_body_hold_too():
-    measured = vf.measure(changed(), verified=True)
+    measured = verified()
     for body in (measured.body1, measured.body2):
         for number in (body.m, body.M):
             assert number.level == "verified"
@@ -230,7 +236,7 @@ def test_without_the_word_nothing_is_proved():
 
 
 def test_bounds_of_proved_constants_are_proved_and_hold_those_of_the_exact_ones(exactly):
-    measured, truth = vf.measure(changed(), verified=True), exactly("matching")
+    measured, truth = verified(), exactly("matching")
     found = evaluate(REPAIRED, measured.constants(), theta="1/1000")
     texts = {name: mp.nstr(truth[name], 30) for name in ("m", "M", "C_R", "C_s", "C_tr")}
     exactly = evaluate(REPAIRED, Constants(**texts, k="1/5"), theta="1/1000")
@@ -241,7 +247,7 @@ def test_bounds_of_proved_constants_are_proved_and_hold_those_of_the_exact_ones(
 
 
 def test_the_thresholds_of_proved_constants_are_proved(exactly):
-    measured, truth = vf.measure(changed(), verified=True), exactly("matching")
+    measured, truth = verified(), exactly("matching")
     plain = vf.measure(changed())
     with mp.workdps(40):  # kappa_2 + kappa_1^2/4 = 1
         a, b = (truth["C_s_energy"] * truth[name] for name in ("C_t1", "C_t2"))
@@ -264,7 +270,7 @@ def test_friction_that_is_no_decimal_enters_the_bounds_as_it_was_written():
 
 
 def test_other_friction_keeps_the_bounds():
-    measured = vf.measure(changed(), verified=True)
+    measured = verified()
     more = measured.with_friction(0.4)
     for name in ("C_K", "kappa_1", "kappa_2"):
         twice, once = getattr(more, name), getattr(measured, name)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import strategies
-from dense_oracle import DensePair, rounding, top
+from dense_oracle import DensePair, close, rounding, stretched, top, with_moduli
 from hypothesis import given
 from hypothesis import strategies as st
 from problem_list import bars, changed
@@ -34,16 +34,6 @@ def values(data: Mapping[str, Any]) -> dict[str, float]:
         for name in ("m", "M")
     }
     return bodies | {name: getattr(measured, name).value for name in CONSTANTS}
-
-
-def close(found: Mapping[str, float], expected: Mapping[str, float], relative: float = 1e-9) -> None:
-    """Every expected value is met."""
-    off = {
-        name: (found[name], value)
-        for name, value in expected.items()
-        if not abs(found[name] - value) <= relative * abs(value)
-    }
-    assert off == {}
 
 
 def condensed(S: np.ndarray, t: int) -> np.ndarray:
@@ -180,11 +170,6 @@ def test_the_matrices_of_a_fine_mesh_are_those_of_dense_lifts():
 # --- units ------------------------------------------------------------------------------------------------------------
 
 
-def with_moduli(data: Mapping[str, Any], factor: Fraction) -> dict[str, Any]:
-    """Both moduli times a factor."""
-    return {**data, **{name: data[name] | {"young": data[name]["young"] * factor} for name in ("body1", "body2")}}
-
-
 def thresholds(edition, data: Mapping[str, Any]) -> dict[str, float]:
     """C_2 to C_5, on k."""
     bounds = evaluate(edition, vf.measure(vf.Problem.from_dict(data)).constants())
@@ -216,23 +201,11 @@ def test_the_editions_agree_in_the_unit_of_stress_in_which_m_is_1(data):
     close(thresholds(PRINTED, unit), thresholds(REPAIRED, unit), 10 * rounding(dense.body1, dense.body2))
 
 
-def stretched(value: Any, c: Fraction) -> Any:
-    return [c * v for v in value]
-
-
 @strategies.fewer(6, at_night=2)
 @given(data=strategies.contact_problems(), c=st.sampled_from([Fraction(1, 1000), Fraction(3), Fraction(254, 10)]))
 def test_another_unit_of_length_changes_nothing_if_L_goes_with_it(data, c):
     """But C_s and C_tr, which hold a length^(1/2): their product C_K does not."""
-    other = dict(data)
-    for name in ("body1", "body2"):
-        other[name] = data[name] | {axis: stretched(data[name][axis], c) for axis in ("x", "y") if axis in data[name]}
-    contact = data["contact"]
-    other["contact"] = contact | {key: c * contact[key] for key in ("radius", "gap") if key in contact}
-    if "interval" in contact:
-        other["contact"]["interval"] = stretched(contact["interval"], c)
-    other["norm"] = {"length": c * data["norm"]["length"]}
-    before, after = values(data), values(other)
+    before, after = values(data), values(stretched(data, c) | {"norm": {"length": c * data["norm"]["length"]}})
     powers = {"C_tr": 0.5, "C_s": -0.5}
     close(after, {name: before[name] * float(c) ** powers.get(name, 0) for name in CONSTANTS})
 

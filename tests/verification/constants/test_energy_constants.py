@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import strategies
-from dense_oracle import DenseBody, DensePair, symmetric, top
+from dense_oracle import DenseBody, DensePair, close, stretched, symmetric, top, with_moduli
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.linalg import eigh
@@ -29,16 +29,6 @@ def values(measured: Measured) -> dict[str, float]:
 
 def measured_of(data: Mapping[str, Any]) -> Measured:
     return vf.measure(vf.Problem.from_dict(data))
-
-
-def close(found: Mapping[str, float], expected: Mapping[str, float], relative: float = 1e-9) -> None:
-    """Every expected value is met."""
-    off = {
-        name: (found[name], value)
-        for name, value in expected.items()
-        if not abs(found[name] - value) <= relative * abs(value)
-    }
-    assert off == {}
 
 
 # --- pencils of whole bodies ------------------------------------------------------------------------------------------
@@ -155,20 +145,6 @@ def test_the_kappas_bound_the_friction_term(data, seed):
 
 
 # --- units and roles --------------------------------------------------------------------------------------------------
-
-
-def with_moduli(data: Mapping[str, Any], factor: Fraction) -> dict[str, Any]:
-    """Both moduli times a factor."""
-    return {**data, **{name: data[name] | {"young": data[name]["young"] * factor} for name in ("body1", "body2")}}
-
-
-def stretched(data: Mapping[str, Any], c: Fraction) -> dict[str, Any]:
-    """Every length times c."""
-    scale = lambda table, keys: {key: [c * v for v in table[key]] for key in keys if key in table}
-    other = {**data, **{name: data[name] | scale(data[name], ("x", "y")) for name in ("body1", "body2")}}
-    contact = data["contact"] | scale(data["contact"], ("interval",))
-    other["contact"] = contact | {key: c * contact[key] for key in ("radius", "gap") if key in contact}
-    return other
 
 
 CHANGES: dict[str, tuple[Callable[[Mapping[str, Any], Fraction], dict[str, Any]], dict[str, float]]] = {

@@ -99,7 +99,8 @@ class Family(NamedTuple):
 #: Columns along Gamma_c of both meshes of a family; 1/columns^2 is the order of what short waves miss.
 COLUMNS = (64, 128) if AT_NIGHT else (32, 64)
 
-FAMILIES = [Family.drawn(seed) for seed in range(200 if AT_NIGHT else 40)]
+#: By day some of those in which short waves decide, of each kind and with few cells.
+FAMILIES = [Family.drawn(seed) for seed in (range(200) if AT_NIGHT else (11, 15, 21, 24, 30, 33, 38))]
 
 
 @cache
@@ -275,7 +276,8 @@ def test_a_measurement_computes_them_only_when_they_are_read(monkeypatch):
 
 
 def test_proved_bounds_enclose_both_and_grids_that_differ_say_why_there_are_none():
-    found = vf.measure(blocks(cells=((16, 8), (8, 4))), verified=True)
+    rows = 4 if AT_NIGHT else 8  # equal cells, by day, are enclosed in a fifth of the time
+    found = vf.measure(blocks(cells=((16, 8), (8, rows))), verified=True)
     for number in (found.rho_cells, found.rho_normal_cells):
         assert number.level == "verified"
         assert number.hi - number.lo <= 1e-9 * number.lo

@@ -337,7 +337,7 @@ def test_with_friction_the_bound_in_energy_norms_speaks_where_the_free_motion_li
 def test_no_step_is_longer_than_the_bound_in_energy_norms(name: str) -> None:
     problem_ = vf.Problem.from_dict(changed(LOOSE[name], contact={"friction": "0.01"} if name[0] == "l" else {}))
     pair = vf.build(problem_)
-    energy = vf.compare(pair).bounds["energy"]
+    energy = vf.compare(pair, bounds=("energy",)).bounds["energy"]
     T, random, theta = FixedPointMap(pair), np.random.default_rng(1), energy.theta
     loads = np.abs(vf.run(pair).last.g).max()
     for _ in range(40):

@@ -65,7 +65,7 @@ MODES = {
 }
 
 
-def linear_run(modes, theta):
+def run_of(modes, theta):
     """The absolute residuals of a run that excites every mode."""
     factors = 1 - theta * (1 + np.array(modes))
     # the shares differ from one another, so that no two modes cancel
@@ -90,7 +90,7 @@ def slowest(modes, theta):
 def test_of_a_linear_run_one_reading_is_right_and_none_contradicts_rho(name, theta):
     modes, rho = MODES[name], max(MODES[name])
     kind, mode, close = slowest(modes, theta)
-    residuals = linear_run(modes, theta)
+    residuals = run_of(modes, theta)
     found = advice(theta, residuals)
     right = reading(found, kind)
     if not close:
@@ -115,7 +115,7 @@ def test_following_the_advice_on_a_linear_run_ends_near_the_best_theta(name, sta
     modes, rho, theta = MODES[name], max(MODES[name]), start
     visited = []
     for _ in range(16):
-        found = advice(theta, linear_run(modes, theta))
+        found = advice(theta, run_of(modes, theta))
         visited.append(theta)
         if found.roles:
             break
@@ -132,27 +132,26 @@ def test_following_the_advice_on_a_linear_run_ends_near_the_best_theta(name, sta
 # --- runs with contact -----------------------------------------------------------------------------------------------
 
 
-def plates(E1, E2, neumann_body, friction, poisson="0.3", cells=((10, 2), (6, 2))):
-    """Section 6 with other moduli; `poisson` is that of the Neumann body."""
-    lower, upper = (poisson, "0.3") if neumann_body == 1 else ("0.3", poisson)
-    data = changed(
-        body1={"young": E1, "poisson": lower, "cells": list(cells[0])},
-        body2={"young": E2, "poisson": upper, "cells": list(cells[1])},
-        contact={"friction": friction},
-        iteration={"neumann_body": neumann_body},
-    )
+def plates(E1, E2, neumann_body, friction):
+    """Section 6 with other moduli."""
+    moduli = {"body1": {"young": E1}, "body2": {"young": E2}}
+    data = changed(**moduli, contact={"friction": friction}, iteration={"neumann_body": neumann_body})
     return pair_from(vf.Problem.from_dict(data))
 
 
-def contact_run(pair, theta, norm="energy"):
-    """The absolute residuals of a run, in the norm (5.21) or as a Euclidean length."""
-    found = []
+def both_lengths(pair, theta):
+    """The absolute residuals of a run, in the norm (5.21) and as Euclidean lengths."""
+    energy, euclidean = [], []
     for state in islice(iterates(FixedPointMap(pair), Constant().begin(pair, theta, None)), 60 + 2 * steps(theta)):
-        length = state.residual if norm == "energy" else float(np.linalg.norm(state.image - state.g))
-        found.append(length)
-        if not ROUNDING * max(found) < length < RUNAWAY * found[0]:
+        energy.append(state.residual)
+        euclidean.append(float(np.linalg.norm(state.image - state.g)))
+        if not ROUNDING * max(energy) < energy[-1] < RUNAWAY * energy[0]:
             break
-    return found
+    return energy, euclidean
+
+
+def contact_run(pair, theta):
+    return both_lengths(pair, theta)[0]
 
 
 PLATES = {
@@ -164,8 +163,15 @@ PLATES = {
 }
 
 
-@pytest.mark.parametrize("friction", ["0", "0.2", "1"])
-@pytest.mark.parametrize("name", PLATES)
+#: Each plate without friction, and with one friction in turn; at night with both.
+RUBBING = [
+    (name, friction)
+    for i, name in enumerate(PLATES)
+    for friction in ("0", *(("0.2", "1") if AT_NIGHT else ("0.2", "1")[i % 2 :][:1]))
+]
+
+
+@pytest.mark.parametrize(("name", "friction"), RUBBING)
 def test_no_theta_is_pasted_from_a_run_that_stays_at_a_level(name, friction):
     """Taken as a mode, a ratio of about 1 led to a theta that never converges."""
     pair = plates(*PLATES[name], friction)
@@ -194,27 +200,22 @@ def test_no_theta_is_pasted_from_a_run_that_stays_at_a_level(name, friction):
     assert levels > 0 or rho <= 1.2
 
 
-@pytest.mark.parametrize("norm", ["energy", "Euclidean"])
 @pytest.mark.parametrize("name", PLATES)
-def test_without_friction_rho_is_at_least_what_a_ratio_above_1_minus_theta_says(name, norm):
+def test_without_friction_rho_is_at_least_what_a_ratio_above_1_minus_theta_says(name):
     pair = plates(*PLATES[name], "0")
     rho = vf.measure(pair).rho_normal.value
-    bounds = 0
+    bounds = [0, 0]  # in either norm
     for theta in (0.9, 0.6, 0.35, 0.2, 0.1, min(1.9 / (1 + rho), 0.99)):
-        residuals = contact_run(pair, round(theta, 4), norm)
-        found = advice(round(theta, 4), residuals)
-        if ratio(residuals, theta) > 1 - theta:
-            bounds += 1
-            assert reading(found, "mode-high").lo <= rho * (1 + 1e-6)
-    assert bounds > 0
+        for i, residuals in enumerate(both_lengths(pair, round(theta, 4))):
+            if ratio(residuals, theta) > 1 - theta:
+                bounds[i] += 1
+                assert reading(advice(round(theta, 4), residuals), "mode-high").lo <= rho * (1 + 1e-6)
+    assert min(bounds) > 0
 
 
-#: Each plate and friction with one of the starts in turn; at night with both.
-FOLLOWED = [
-    (name, friction, start)
-    for i, (name, friction) in enumerate(product(PLATES, ["0", "0.2", "1"]))
-    for start in ([0.9, 0.3] if AT_NIGHT else [[0.9, 0.3][i % 2]])
-]
+#: Plates, frictions and starts in turn; at night each with each.
+EVERY = list(product(PLATES, ["0", "0.2", "1"], [0.9, 0.3]))
+FOLLOWED = EVERY if AT_NIGHT else EVERY[::5]
 
 
 @pytest.mark.parametrize(("name", "friction", "start"), FOLLOWED)
@@ -227,28 +228,6 @@ def test_following_the_advice_ends_in_a_theta_that_converges_within_a_few_runs(n
         if converged(residuals):
             break
         assert found.roles == ()  # what is pasted converges
-        found = advice(theta, residuals)
-    assert converged(residuals)
-
-
-def test_a_steady_divergence_bounds_rho_and_is_no_mode():
-    """A nearly incompressible Neumann body: 4.51 a step with 16 of 25 nodes open, although no mode is -4.51."""
-    pair = plates(1e3, 5e4, 1, "0", poisson="0.49", cells=((40, 6), (24, 6)))
-    theta, rho = 0.7, vf.measure(pair).rho_normal.value
-    seen = list(islice(iterates(FixedPointMap(pair), Constant().begin(pair, theta, None)), 60))
-    residuals = [state.residual for state in seen]
-    assert ratio(residuals, theta) == pytest.approx(4.5123, abs=1e-4)
-    assert np.count_nonzero(~seen[-1].contact.pattern.touching) == 16
-    found = advice(theta, residuals)
-    high = reading(found, "mode-high")
-    assert high.lo == pytest.approx(5.5123 / 0.7 - 1, abs=1e-3)
-    assert high.lo < 0.5 * rho  # so rho is not this value
-    assert found.roles == ()
-    for _ in range(7):
-        theta = found.next.theta
-        residuals = contact_run(pair, theta)
-        if converged(residuals):
-            break
         found = advice(theta, residuals)
     assert converged(residuals)
 
@@ -327,7 +306,6 @@ def test_a_document_of_a_run_says_what_is_unknown_and_why():
     [
         ("0.45", "0.8", ["mode-high"]),
         ("0.1", "1.4", ["mode-high", "level"]),
-        ("0.3", "1", ["mode-high", "level"]),
         ("0.3", "0.97", ["mode-high", "level"]),
         ("0.1", "0.5", ["mode-high", "mode-low"]),
         ("0.6", "0.4", ["mode-high", "mode-low", "open"]),

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mesh_writer import write_gmsh22
-from strategies import fewer
+from mesh_writer import read_here, write_gmsh22
+from strategies import AT_NIGHT, fewer
 
 import verification as vf
-from fem1d2d import rectangle
+from fem1d2d import mesh_files, rectangle
 from ndtheory import HypothesisError
 
 youngs = st.integers(1, 100)
@@ -95,7 +95,7 @@ def test_on_flat_meshes_rho_rises_to_the_bounds_in_both_roles_and_beyond_if_pois
     """Both bodies go on beyond Gamma_c, so that no corner counts."""
     found = vf.advise_moduli(young=(7, 2), poisson=(nu1, nu2))
     rho = []
-    for n in (1, 2, 4, 8):
+    for n in (1, 3, 6):
         problem = blocks(
             young=(7, 2),
             poisson=(nu1, nu2),
@@ -135,10 +135,11 @@ def graded(path, layers: int, cells: int):
     )
 
 
-def test_on_graded_meshes_corners_raise_rho_towards_their_bounds_with_and_without_friction(tmp_path):
-    """One over the root of the distance to the bound grows alike with each four layers: the distance is 1/log^2 h."""
+def test_on_graded_meshes_corners_raise_rho_towards_their_bounds_with_and_without_friction(tmp_path, monkeypatch):
+    """One over the root of the distance to the bound grows alike with each two layers: the distance is 1/log^2 h."""
     bounds = vf.advise_moduli(young=(7, 2), poisson=("0.3", "0.3"), corners="2").moduli.roles[1].corners
-    upper = [vf.measure(graded(tmp_path, layers, 3).swapped()) for layers in (4, 8, 12)]
+    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+    upper = [vf.measure(graded(tmp_path, layers, 3).swapped()) for layers in (3, 5, 7)]
     for name, kind in (("rho_max", "stick"), ("rho_normal", "slide")):
         seen = [getattr(measured, name).value for measured in upper]
         limit = getattr(bounds["2"], kind).value
@@ -215,8 +216,9 @@ def test_without_friction_the_theta_to_start_with_contracts_by_its_factor(nu):
         assert run.observed_rate.value <= start.factor_free(theta).hi * (1 + 1e-3)
 
 
-@pytest.mark.parametrize("height", ["0.3", "3"])
-@pytest.mark.parametrize("young", [(7, 2), (1, 1), (1, 5)])
+@pytest.mark.parametrize(
+    ("young", "height"), [((7, 2), "0.3"), ((1, 5), "3"), *([((7, 2), "3"), ((1, 5), "0.3"), ((1, 1), "3")] * AT_NIGHT)]
+)
 def test_with_friction_runs_at_the_guess_converge_on_layers_and_columns(young, height):
     problem = blocks(
         young=young,
@@ -243,6 +245,7 @@ def test_two_over_two_plus_bound_stalls_on_a_soft_upper_body_and_is_never_advise
     assert found.roles[1].rho.value == pytest.approx(bound)
     stalls = 2 / (2 + bound)
     assert not vf.run(problem.with_theta(f"{stalls:.4f}")).converged
+    named = {}
     for corners in (None, "none", "1", "2", "both"):
         asked = vf.advise_moduli(young=young, poisson=("0.3", "0.3"), corners=corners)
         for role in asked.roles:
@@ -250,8 +253,9 @@ def test_two_over_two_plus_bound_stalls_on_a_soft_upper_body_and_is_never_advise
             assert role.theta_predicted is None
         with pytest.raises(ValueError, match="predicts no theta"):
             _ = asked.best.predicted
-        run = vf.run(problem.changed(neumann_body=asked.neumann_body or 2).with_theta(str(asked.next.theta)))
-        assert run.converged
+        named |= {(asked.neumann_body or 2, asked.next.theta): corners}
+    for body, theta in named:
+        assert vf.run(problem.changed(neumann_body=body).with_theta(str(theta))).converged
 
 
 def test_the_role_with_the_smaller_bound_is_tried_first_and_equal_bounds_are_no_advice():
@@ -286,20 +290,14 @@ def test_an_incompressible_body_is_held_by_no_multiple_of_a_compressible_one():
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"young": (1,)}, "young = 1: needed two numbers E1,E2"),
-        ({"young": (1, 2, 3)}, "young = 1,2,3: needed two numbers"),
         ({"young": "1,2"}, "young = 1,2: needed two numbers"),
         ({"young": 7}, "young = 7: needed two numbers"),
-        ({"young": (-1, 2)}, "young = -1: needed numbers E > 0"),
-        ({"young": (1, "soft")}, "young = soft: needed"),
         ({"young": (1, "1e30")}, r"young = 1\S*: needed numbers E > 0 \(1e-24 to 1e24\)"),
         ({"young": (1, float("nan"))}, "young = nan"),
-        ({"poisson": ("0.3", "0.6")}, "poisson = 0.6: needed numbers with -1 < nu <= 1/2"),
         ({"poisson": (-1, "0.3")}, "poisson = -1"),
         ({"plane": "shell"}, "plane = shell: needed one of strain, stress, 3d"),
         ({"corners": "3"}, "corners = 3: needed one of none, 1, 2, both"),
         ({"mirror": [3]}, r"mirror = \[3\]: needed bodies 1, 2 or both"),
-        ({"mirror": [2], "corners": "1"}, "that of body 2 goes on where body 1 ends in a corner"),
         ({"flat": True}, "flat = True: needed a mirror image"),
     ],
 )

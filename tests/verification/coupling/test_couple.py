@@ -45,15 +45,8 @@ def test_it_takes_the_steps_of_the_same_rule_on_the_same_bodies():
     problem = vf.example("section6").changed(cells=((10, 2), (6, 2)))
     pair = vf.build(problem)
     run, T = vf.run(pair, theta="0.6"), FixedPointMap(pair)
-    found = vf.couple(
-        lambda g: g,
-        lambda u: T(u)[1].force,
-        start=np.zeros(pair.neumann.grid.size),
-        rule="constant",
-        theta="0.6",
-        tolerance=1e-9,
-        max_iterations=200,
-    )
+    settings = {"rule": "constant", "theta": "0.6", "tolerance": 1e-9, "max_iterations": 200}
+    found = vf.couple(lambda g: g, lambda u: T(u)[1].force, start=np.zeros(pair.neumann.grid.size), **settings)
     assert found.converged
     assert found.force == pytest.approx(run.last.g, rel=1e-6, abs=1e-6 * np.abs(run.last.g).max())
 
@@ -67,29 +60,26 @@ def test_iterations_count_evaluations_and_the_limit_is_kept():
     assert (len(calls), found.iterations, found.converged) == (7, 7, False)
 
 
-def test_a_coupling_that_runs_away_ends():
-    found = vf.couple(lambda g: g, lambda u: 1 - 30 * u, start=0.0, rule="constant", theta=0.9, max_iterations=1000)
-    assert not found.converged
-    assert found.iterations < 60
-    assert found.spectrum.high == pytest.approx(30)
-    assert found.diverged
-    assert found.summary.startswith(f"diverged, {found.iterations} evaluations")
-
-
-def test_a_run_that_grows_until_its_limit_has_diverged_and_one_that_is_cut_short_has_not():
-    """By 1 - theta (1 + lambda) of the only mode, -1.2 and 0.5, over eight evaluations."""
-    falls = vf.couple(lambda g: g, lambda u: 1 - u, start=0.0, rule="constant", theta="1/4", max_iterations=8)
-    assert not falls.converged
-    assert not falls.diverged
+def test_a_coupling_has_diverged_where_it_runs_away_or_five_changes_have_grown():
+    """The change of the only mode is multiplied by 1 - theta (1 + lambda): -26.9, 0.5 and -1.2."""
+    run = lambda slope, theta, most: vf.couple(
+        lambda g: g, lambda u: 1 - slope * u, start=0.0, rule="constant", theta=theta, max_iterations=most
+    )
+    away = run(30, 0.9, 1000)
+    assert (away.converged, away.diverged) == (False, True)
+    assert away.iterations < 60
+    assert away.spectrum.high == pytest.approx(30)
+    assert away.summary.startswith(f"diverged, {away.iterations} evaluations")
+    falls, grows = run(1, 0.25, 8), run(3.4, 0.5, 8)
+    assert (falls.converged, falls.diverged, grows.diverged) == (False, False, True)
     assert falls.summary.startswith("not converged, 8 evaluations")
-    grows = vf.couple(lambda g: g, lambda u: 1 - 3.4 * u, start=0.0, rule="constant", theta=0.5, max_iterations=8)
-    assert grows.diverged
     assert grows.summary.startswith("diverged, 8 evaluations")
+    assert [run(3.4, 0.5, n).diverged for n in range(1, 8)] == [False] * 4 + [True] * 3  # fewer may be a transient
 
 
 @pytest.mark.parametrize("at", [1, 4])
 @pytest.mark.parametrize("who", [0, 1])
-@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt, TypeError, ValueError])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_what_a_solver_raises_reaches_the_caller_and_nothing_is_called_after_it(at, who, error):
     calls = []
 
@@ -154,11 +144,6 @@ def test_a_listener_hears_each_evaluation_in_one_line():
     assert "must take forces (fluxes)" in str(said[-1].advice.sections())
 
 
-def test_rest_is_a_solution():
-    found = vf.couple(lambda g: g, lambda u: -u, start=np.zeros(4))
-    assert (found.converged, found.iterations, found.spectrum, found.advice) == (True, 1, None, None)
-
-
 def test_a_loop_of_ones_own_takes_the_same_steps():
     coupling = Linear(np.linspace(0.4, 4.0, 6), 2)
     found = vf.couple(lambda g: coupling.H @ g, lambda u: coupling.b - u, start=np.zeros(6), rule="aitken", theta=0.3)
@@ -170,7 +155,9 @@ def test_a_loop_of_ones_own_takes_the_same_steps():
     assert own.advice.theta == found.advice.theta
 
 
-def test_before_two_vectors_there_is_no_spectrum():
+def test_rest_is_a_solution_and_before_two_vectors_there_is_no_spectrum():
+    found = vf.couple(lambda g: g, lambda u: -u, start=np.zeros(4))
+    assert (found.converged, found.iterations, found.spectrum, found.advice) == (True, 1, None, None)
     own = vf.Coupling()
     assert own.spectrum is None
     own.next([0.0], [1.0])
@@ -202,9 +189,7 @@ def test_an_own_rule_that_works_on_vectors_is_taken():
     [
         ({"rule": "broyden"}, "needed one of constant, aitken, anderson, iqn-ils"),
         ({"theta": 0}, "0 < theta <= 1"),
-        ({"theta": "x"}, "0 < theta <= 1"),
         ({"tolerance": 0}, "tolerance = 0: needed a number > 0"),
-        ({"tolerance": "small"}, "tolerance = small: needed a number > 0"),
         ({"tolerance": math.inf}, "tolerance = inf: needed a number > 0"),
         ({"max_iterations": 0}, "max_iterations = 0: needed a whole number > 0"),
         ({"max_iterations": 2.5}, "max_iterations = 2.5: needed a whole number > 0"),
@@ -256,11 +241,3 @@ def test_a_wrong_sign_is_told_where_the_end_is_printed():
     found = vf.couple(lambda g: g / 2, lambda u: 3 + 0.5 * u, start=0.0)
     assert found.converged
     assert "but all eigenvalues are negative: one solver probably has the wrong sign" in found.summary
-
-
-def test_a_coupling_has_diverged_only_where_five_changes_have_grown():
-    """The change grows by 1.2 a step; with fewer than five of them it may be a transient."""
-    cut = lambda n: vf.couple(
-        lambda g: g, lambda u: 1 - 3.4 * u, start=0.0, rule="constant", theta=0.5, max_iterations=n
-    )
-    assert [cut(n).diverged for n in range(1, 8)] == [False] * 4 + [True] * 3

@@ -147,7 +147,6 @@ def test_the_vectors_that_Kratos_writes_by_the_block_of_the_page_give_theta(tmp_
     found = vf.advise_vectors(np.load("X.npy"), np.load("TX.npy"), tied=True)
     assert json.loads(capsys.readouterr().out)["theta"] == found.theta
     role = next(role for role in vf.advise(problem, tied=True).roles if role.neumann_body == 2)
-    assert (found.spectrum.low, found.spectrum.high) == pytest.approx(
-        (role.rho_min.value, role.rho_tied.value), rel=0.25
-    )
+    ends = role.rho_min.value, role.rho_tied.value
+    assert (found.spectrum.low, found.spectrum.high) == pytest.approx(ends, rel=0.25)
     assert steps(role.spectrum, "constant", found.theta) <= 1.4 * steps(role.spectrum, "constant", role.theta_tied)

@@ -116,55 +116,39 @@ def test_predictions_on_all_eigenvalues_are_near_the_steps_of_couplings(seed):
         assert 0.6 <= predicted / taken <= 1.5, method
 
 
-def row(method, count, *, exchanged=False):
-    return MethodRow(method=method, neumann_body=None, exchanged=exchanged, theta=0.5, steps=count)
+def table(own, exchanged=()):
+    """Rows with these steps of each method, in the roles as they are and exchanged."""
+    return [
+        MethodRow(method=method, neumann_body=None, exchanged=other, theta=0.5, steps=count)
+        for other, counts in ((False, own), (True, exchanged))
+        for method, count in zip(METHODS, counts, strict=False)
+    ]
 
 
-def test_the_simplest_method_is_kept_where_it_costs_little():
-    table = [row("constant", 12), row("aitken", 11), row("iqn-ils", 10)]
-    found = advised(table, tied=True)
-    assert found.name == "constant"
-    assert found.reason.startswith("12 steps; IQN-ILS takes 10, hardly fewer")
+@pytest.mark.parametrize(
+    ("own", "exchanged", "tied", "name", "reason"),
+    [
+        ((12, 11, 10), (), True, "constant", "12 steps; IQN-ILS takes 10, hardly fewer"),
+        ((4, 3), (2,), True, "constant", ""),  # neither a method nor exchanged roles for two steps
+        ((5, 2), (), True, "aitken", ""),
+        ((237, 52, 14), (), True, "iqn-ils", "14 steps; a constant theta takes 237, 17 times as many"),
+        ((237, 52, 14), (), False, "aitken", "IQN-ILS takes 14 if contact does not change"),  # shown, not advised
+        ((60, 22, 20), (), True, "aitken", ""),  # where both are about as fast
+        ((60, 25, 20), (), True, "iqn-ils", ""),
+        ((100, 30, 12), (11, 11, 10), True, "iqn-ils", ""),  # exchanged only where no method serves in these roles
+        ((100, 30, 12), (6, 6, 6), True, "constant, exchanged", ""),
+    ],
+)
+def test_the_simplest_method_that_costs_little_is_advised(own, exchanged, tied, name, reason):
+    found = advised(table(own, exchanged), tied=tied)
+    assert found.name + ", exchanged" * found.exchanged == name
+    assert reason in found.reason
     assert NEAR * 10 >= 12
 
 
-def test_neither_a_method_nor_the_other_roles_are_taken_for_two_steps():
-    table = [row("constant", 4), row("aitken", 3), row("constant", 2, exchanged=True)]
-    found = advised(table, tied=True)
-    assert (found.name, found.exchanged) == ("constant", False)
-    assert advised([row("constant", 5), row("aitken", 2)], tied=True).name == "aitken"
-
-
-def test_a_method_that_saves_steps_is_advised_with_what_it_saves():
-    table = [row("constant", 237), row("aitken", 52), row("iqn-ils", 14)]
-    found = advised(table, tied=True)
-    assert found.name == "iqn-ils"
-    assert found.reason == "14 steps; a constant theta takes 237, 17 times as many"
-
-
-def test_in_contact_iqn_ils_is_shown_and_not_advised():
-    table = [row("constant", 237), row("aitken", 52), row("iqn-ils", 14)]
-    found = advised(table, tied=False)
-    assert found.name == "aitken"
-    assert found.reason.endswith("IQN-ILS takes 14 if contact does not change")
-
-
-def test_aitken_is_preferred_to_iqn_ils_where_both_are_about_as_fast():
-    assert advised([row("constant", 60), row("aitken", 22), row("iqn-ils", 20)], tied=True).name == "aitken"
-    assert advised([row("constant", 60), row("aitken", 25), row("iqn-ils", 20)], tied=True).name == "iqn-ils"
-
-
-def test_roles_are_exchanged_only_where_no_method_serves_in_these():
-    own = [row("constant", 100), row("aitken", 30), row("iqn-ils", 12)]
-    near = [row("constant", 11, exchanged=True), row("aitken", 11, exchanged=True), row("iqn-ils", 10, exchanged=True)]
-    far = [row("constant", 6, exchanged=True), row("aitken", 6, exchanged=True), row("iqn-ils", 6, exchanged=True)]
-    assert (advised(own + near, tied=True).name, advised(own + near, tied=True).exchanged) == ("iqn-ils", False)
-    assert (advised(own + far, tied=True).name, advised(own + far, tied=True).exchanged) == ("constant", True)
-    assert advised(own + far, tied=True, exchanged=False).name == "iqn-ils"
-
-
-def test_without_a_method_that_arrives_none_is_advised():
-    assert advised([row("constant", None), row("aitken", None), row("iqn-ils", None)], tied=True) is None
+def test_without_a_method_that_arrives_none_is_advised_and_roles_may_be_left_as_they_are():
+    assert advised(table((None, None, None)), tied=True) is None
+    assert advised(table((100, 30, 12), (6, 6, 6)), tied=True, exchanged=False).name == "iqn-ils"
 
 
 def test_rows_have_the_theta_of_the_role():

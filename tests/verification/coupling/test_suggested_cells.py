@@ -28,7 +28,7 @@ def drawn(seed: int) -> vf.Problem:
     )
 
 
-PROBLEMS = [drawn(seed) for seed in range(200 if AT_NIGHT else 16)]
+PROBLEMS = [drawn(seed) for seed in range(200 if AT_NIGHT else 6)]
 LOW = Number.of_float(0.0)  # as if nothing but the cells decided rho
 NAMES = ("rho_cells", "rho_normal_cells")
 SUGGESTED = [
@@ -37,7 +37,7 @@ SUGGESTED = [
 
 
 def test_some_problems_have_better_cells_and_some_have_none():
-    assert 8 <= len(SUGGESTED) < 2 * len(PROBLEMS)
+    assert len(PROBLEMS) / 2 <= len(SUGGESTED) < 2 * len(PROBLEMS)
 
 
 @pytest.mark.parametrize(("problem", "normal", "found"), SUGGESTED, ids=lambda value: "")

@@ -131,9 +131,10 @@ def ramp(path, slope, neumann=2):
 def test_bodies_on_a_ramp_are_refused_with_the_slope_and_its_place(tmp_path, neumann):
     contact = 3 - neumann
     words = rf"body{contact}\.mesh: body {contact} is the contact body, and its line has the slope -0\.3 from \("
+    problem = ramp(tmp_path, -0.3, neumann)
     for door in (vf.build, vf.solve, vf.run, vf.measure):
         with pytest.raises(vf.ProblemError, match=words + rf".*0\.02.*body {neumann} is steep too"):
-            door(ramp(tmp_path, -0.3, neumann))
+            door(problem)
 
 
 def test_a_slope_of_002_is_allowed_and_more_is_refused(tmp_path):

@@ -5,17 +5,11 @@ from fractions import Fraction
 import meshio
 import numpy as np
 import pytest
-from mesh_writer import read_here
 
 import verification as vf
-from fem1d2d import mesh_files, rectangle
+from fem1d2d import rectangle
 from verification.certificate.contraction import certify
 from verification.interface.assembly import discretise
-
-
-@pytest.fixture(autouse=True)
-def here(monkeypatch):
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
 
 
 def layered(path, y, cells=(4, 4), names=("steel", "rubber")):

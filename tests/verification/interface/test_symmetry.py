@@ -7,11 +7,11 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
-from mesh_writer import read_here, write_gmsh22
+from mesh_writer import write_gmsh22
 from scipy.linalg import eigh
 
 import verification as vf
-from fem1d2d import mesh_files, rectangle
+from fem1d2d import rectangle
 from verification.interface.files import read_interface, write_interface
 from verification.problem import ProblemError
 
@@ -125,9 +125,8 @@ def arcs(folder, *, half, cells, curvature, friction="0.3", law="nonlocal"):
 
 
 @pytest.mark.parametrize("given", [((8, 6), -0.2), ((6, 10), -0.2), ((6, 4), 0.1), ((8, 8), 0.0)], ids=str)
-def test_half_of_curved_bodies_has_the_stresses_of_the_whole_ones(given, tmp_path, monkeypatch):
+def test_half_of_curved_bodies_has_the_stresses_of_the_whole_ones(given, tmp_path):
     """Also where the curve through the nodes of the other body is evaluated beside the axis."""
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
     half, whole = (arcs(tmp_path, half=half, cells=given[0], curvature=given[1]) for half in (True, False))
     compared(vf.solve(half).contact, vf.solve(whole).contact)
     compared(vf.run(half).contact, vf.run(whole).contact)

@@ -10,6 +10,7 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
+import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 from problem_list import changed, small
@@ -230,6 +231,7 @@ def test_pairs_of_matrices_with_different_frictions_have_different_rows():
     assert len({keys(pair, SweepGrid.of({}))[0] for pair in pairs}) == 3
 
 
+@strategies.fewer(3)
 @given(problems(**VARYING, law="nonlocal"))
 def test_kappa_is_at_most_that_of_the_largest_coefficient_and_is_an_eigenvalue(problem):
     pair = vf.build(problem)
@@ -350,6 +352,7 @@ def test_screens_name_the_range_and_the_factor_by_which_friction_may_grow():
     assert "contracts for k <" not in advice
 
 
+@pytest.mark.usefixtures("known_continuum")
 def test_the_continuum_takes_the_largest_coefficient():
     found = certify_continuum(vf.example("section6").changed(friction=RISING))
     constants = found.content()["constants"]

@@ -119,12 +119,13 @@ def at(best):
     return lambda theta: round(20 + 450 * (theta - best) ** 2)
 
 
-IDS = ["sec-6.3", "fig-11", "fig-12"]
+#: A claim on one mesh, and one on all.
+IDS = ["sec-6.3", "fig-10"]
 OF_TEXT = [reading for reading in READINGS if not reading.departs]
 ALL = len(READINGS)
 
 
-@pytest.mark.parametrize("id", [*IDS, "fig-10"])
+@pytest.mark.parametrize("id", IDS)
 def test_what_every_reading_shows_is_numerical_and_said_to_be_reproduced(id):
     evidence = of(Section6("full", run=made(lambda reading, values: at(0.6))), id)
     assert evidence.holds is True
@@ -132,7 +133,7 @@ def test_what_every_reading_shows_is_numerical_and_said_to_be_reproduced(id):
     assert settle([evidence])[0] == "NUMERICAL"
 
 
-@pytest.mark.parametrize("id", [*IDS, "fig-10"])
+@pytest.mark.parametrize("id", IDS)
 def test_what_one_reading_shows_is_numerical_under_what_that_reading_assumes(id):
     shows = READINGS[-1]
     evidence = of(Section6("full", run=made(lambda reading, values: at(0.6 if reading == shows else 0.3))), id)
@@ -143,7 +144,7 @@ def test_what_one_reading_shows_is_numerical_under_what_that_reading_assumes(id)
     assert [found["holds"] for found in evidence.data["readings"]].count(True) == 1
 
 
-@pytest.mark.parametrize("id", [*IDS, "fig-10"])
+@pytest.mark.parametrize("id", IDS)
 def test_what_no_reading_shows_is_undecided_and_the_nearest_reading_is_named(id):
     near = READINGS[7]
     evidence = of(Section6("full", run=made(lambda reading, values: at(0.45 if reading == near else 0.3))), id)
@@ -181,10 +182,10 @@ def test_one_curve_of_a_figure_that_0_6_does_not_serve_is_enough_against_a_readi
     assert of(section, "sec-6.3").holds is True
 
 
-@pytest.mark.parametrize(("outcome", "verdict"), [("refused", None), ("error", None)])
-def test_runs_that_fail_show_nothing_and_refute_nothing(outcome, verdict):
+@pytest.mark.parametrize("outcome", ["refused", "error"])
+def test_runs_that_fail_show_nothing_and_refute_nothing(outcome):
     evidence = of(Section6("quick", run=made(None, outcome)), "fig-11")
-    assert evidence.holds is verdict
+    assert evidence.holds is None
     assert f"in none of the {ALL} readings tried, {ALL} of which are refused" in evidence.text
     assert {found["reason"]["holds"] for found in evidence.data["readings"]} == {"made so"}
 
@@ -256,11 +257,10 @@ def test_the_two_curves_against_one_theta_for_all_moduli_have_no_theta_in_common
     assert serve <= fail | set(soft["not_met"])
 
 
-@pytest.mark.parametrize("reading", READINGS, ids=lambda reading: reading.name)
-def test_what_the_ledger_says_is_assumed_is_what_each_reading_has(seen, reading):
-    problem, (evidence,) = reading.problem(190), seen["fig-5"]
-    assert evidence.data["assumed"]["law"] == problem.contact.law
-    assert evidence.data["assumed"]["radius"] == float(problem.contact.radius)
+def test_what_the_ledger_says_is_assumed_is_what_each_reading_has(seen):
+    contacts = [reading.problem(190).contact for reading in READINGS]
+    ((law, radius),) = {(contact.law, float(contact.radius)) for contact in contacts}
+    assert seen["fig-5"][0].data["assumed"].items() >= {"law": law, "radius": radius}.items()
 
 
 def test_figure_5_is_that_of_half_models_among_them_one_pressed_on_the_left_two_thirds_of_its_top(seen):

@@ -3,7 +3,6 @@
 import copy
 import dataclasses
 import math
-import pickle
 import tomllib
 from decimal import Decimal
 from fractions import Fraction as F
@@ -13,8 +12,9 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
-from mesh_writer import write_gmsh22
+from mesh_writer import read_here, write_gmsh22
 from problem_list import bars, small
+from strategies import fewer
 
 import verification as vf
 from fem1d2d import rectangle
@@ -71,6 +71,7 @@ def test_a_float_of_a_dictionary_means_its_shortest_decimal(given_value, value):
     assert plane("contact.friction", given_value).contact.friction == value
 
 
+@fewer(3)
 @given(strategies.contact_problems())
 def test_every_number_of_a_dictionary_is_kept(data):
     problem = vf.Problem.from_dict(data)
@@ -104,20 +105,10 @@ def test_what_is_left_out_takes_its_default():
     assert problem.body1.body_force == (0, 0)
     assert dict(problem.body1.prescribed) == dict(problem.body1.traction) == {}
     contact, iteration = problem.contact, problem.iteration
-    assert (contact.interval, contact.friction, contact.law, contact.radius, contact.gap) == (
-        None,
-        0,
-        "nonlocal",
-        None,
-        0,
-    )
+    found = (contact.interval, contact.friction, contact.law, contact.radius, contact.gap)
+    assert found == (None, 0, "nonlocal", None, 0)
     assert (iteration.neumann_body, iteration.theta, iteration.max_iterations) == (2, F(1, 2), 500)
     assert iteration.tolerance == 1e-9
-
-
-def numbers(result):
-    """The document of a result without the problem, which tells how it was given."""
-    return {key: value for key, value in result.to_dict().items() if key != "problem"}
 
 
 def test_contact_reaches_as_far_as_the_bodies_overlap():
@@ -141,6 +132,7 @@ def test_a_free_component_is_none():
 # --- problems made from problems ---
 
 
+@fewer(3)
 @given(strategies.contact_problems(), strategies.thetas())
 def test_another_theta_changes_theta_alone(data, theta):
     problem = vf.Problem.from_dict(data)
@@ -156,6 +148,7 @@ def test_a_theta_outside_the_interval_is_refused(theta):
     assert error.value.key == "theta"
 
 
+@fewer(3)
 @given(strategies.contact_problems())
 def test_swapping_twice_is_no_change(data):
     problem = vf.Problem.from_dict(data)
@@ -163,6 +156,7 @@ def test_swapping_twice_is_no_change(data):
     assert problem.swapped().swapped() == problem
 
 
+@fewer(3)
 @given(strategies.contact_problems(), st.integers(0, 4))
 def test_halving_doubles_the_cells_each_time(data, halvings):
     problem = vf.Problem.from_dict(data)
@@ -182,11 +176,6 @@ def test_a_problem_is_frozen():
     problem = plane()
     with pytest.raises(dataclasses.FrozenInstanceError):
         problem.title = "other"
-
-
-@pytest.mark.parametrize("travel", [copy.deepcopy, lambda problem: pickle.loads(pickle.dumps(problem))])
-def test_a_problem_can_be_sent_to_another_process(travel):
-    assert travel(plane()) == plane()
 
 
 def test_a_dictionary_is_not_changed_by_reading_it():
@@ -209,22 +198,12 @@ def test_lists_and_tuples_are_read_alike(sequence):
 @pytest.mark.parametrize(
     ("key", "value", "needed"),
     [
-        ("body1.young", -1, "> 0"),
-        ("body1.young", True, "> 0"),
         ("body1.young", math.nan, "> 0"),
-        ("body2.poisson", 0.5, "-1 < nu < 0.5"),
-        ("contact.friction", -0.1, ">= 0"),
-        ("contact.radius", 0, "> 0"),
         ("contact.law", "Local", "nonlocal"),
         ("iteration.theta", 1, "0 < theta < 1"),
-        ("iteration.tolerance", 0, "0 < tolerance < 1"),
-        ("iteration.max_iterations", 12.5, "whole number"),
         ("body1.cells", [10, 0], "whole number"),
         ("body1.x", [2, 0], "a < b"),
-        ("body1.fixed", ["under"], "left, right, bottom, top"),
-        ("body1.shape", "circle", "rectangle"),
         ("title", 3, "text"),
-        ("dimension", 3, "1, 2"),
         ("norm", [], "table"),
     ],
     ids=str,
@@ -243,16 +222,13 @@ def test_an_error_carries_file_key_value_and_what_is_needed(key, value, needed):
     assert message.isprintable()
 
 
-@pytest.mark.parametrize(
-    ("key", "file_key"),
-    [("young", "body1.young"), ("x", "body1.x"), ("poisson", "body1.poisson"), ("shape", "body1.shape")],
-)
-def test_a_missing_key_has_no_value(key, file_key):
+@pytest.mark.parametrize("key", ["x", "poisson", "shape"])
+def test_a_missing_key_has_no_value(key):
     data = copy.deepcopy(PLANE)
     del data["body1"][key]
     with pytest.raises(vf.ProblemError) as caught:
         vf.Problem.from_dict(data)
-    assert (caught.value.file, caught.value.key, caught.value.value) == ("<dict>", file_key, None)
+    assert (caught.value.file, caught.value.key, caught.value.value) == ("<dict>", f"body1.{key}", None)
     assert "missing" in caught.value.needed
 
 
@@ -260,11 +236,8 @@ def test_a_missing_key_has_no_value(key, file_key):
     ("key", "meant"),
     [
         ("titel", "title"),
-        ("body1.yuong", "young"),
         ("body1.poison", "poisson"),
-        ("body2.prescibed", "prescribed"),
         ("contact.fricton", "friction"),
-        ("iteration.max_iteration", "max_iterations"),
         ("norm.lenght", "length"),
         ("iteratoin", "iteration"),
     ],
@@ -288,17 +261,7 @@ def test_what_is_no_dictionary_is_refused(data):
         vf.Problem.from_dict(data)
 
 
-@pytest.mark.parametrize(
-    ("content", "needed"),
-    [
-        (None, "no such file"),
-        (b"", "empty"),
-        (b"\xff\xfe", "empty"),
-        (b"a = ", "TOML"),
-        (b"\xff\xfea", "UTF-8"),
-        (b"\xff", "UTF-8"),
-    ],
-)
+@pytest.mark.parametrize(("content", "needed"), [(None, "no such file"), (b"\xff\xfe", "empty"), (b"\xff", "UTF-8")])
 def test_what_is_no_problem_file_is_refused_with_its_name(tmp_path, content, needed):
     path = tmp_path / "my.toml"
     if content is not None:
@@ -308,14 +271,13 @@ def test_what_is_no_problem_file_is_refused_with_its_name(tmp_path, content, nee
     assert (caught.value.file, caught.value.key, caught.value.value) == (str(path), "", None)
 
 
-@pytest.mark.parametrize("function", [vf.measure, vf.run, vf.compare, lambda problem: next(vf.iterate(problem))])
 @pytest.mark.parametrize(
-    ("key", "value", "named"),
+    ("function", "key", "value", "named"),
     [
-        ("body1.fixed", [], "body1"),
-        ("body1.fixed", ["bottom", "top"], "body1.fixed"),
-        ("body2.x", [3, 4], "body2.x"),
-        ("contact.interval", [0, 1], "contact.interval"),
+        (vf.measure, "body1.fixed", [], "body1"),
+        (vf.run, "body1.fixed", ["bottom", "top"], "body1.fixed"),
+        (vf.compare, "body2.x", [3, 4], "body2.x"),
+        (lambda problem: next(vf.iterate(problem)), "contact.interval", [0, 1], "contact.interval"),
     ],
 )
 def test_a_problem_that_cannot_be_built_is_refused_by_every_function(function, key, value, named):
@@ -326,6 +288,12 @@ def test_a_problem_that_cannot_be_built_is_refused_by_every_function(function, k
 
 
 # --- mesh files ---
+
+
+@pytest.fixture
+def read_at_once(monkeypatch):
+    """Files of meshes are read in this process: those of these tests need no limits."""
+    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)
 
 
 def gmsh(path, mesh, version="2.2", order=None):
@@ -374,7 +342,7 @@ def meshed(folder, version="2.2", order=None):
     return vf.Problem.from_dict(data, source=str(folder / "problem.toml"))
 
 
-@pytest.mark.usefixtures("known_bounds")
+@pytest.mark.usefixtures("known_bounds", "read_at_once")
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
 def test_a_rectangle_from_a_mesh_file_is_the_built_in_one(tmp_path, version):
     from_file, built_in = (vf.compare(given).content() for given in (meshed(tmp_path, version), plane()))
@@ -387,7 +355,7 @@ def test_a_rectangle_from_a_mesh_file_is_the_built_in_one(tmp_path, version):
     assert from_file == built_in
 
 
-@pytest.mark.usefixtures("known_bounds")
+@pytest.mark.usefixtures("known_bounds", "read_at_once")
 def test_the_numbering_of_a_mesh_file_does_not_matter(tmp_path):
     renumbered = vf.compare(meshed(tmp_path, order=np.random.default_rng(7).permutation)).to_dict()
     expected = vf.compare(plane()).to_dict()
@@ -400,6 +368,7 @@ def test_the_numbering_of_a_mesh_file_does_not_matter(tmp_path):
     assert renumbered["run"]["iterations"] == expected["run"]["iterations"]
 
 
+@pytest.mark.usefixtures("read_at_once")
 def test_one_body_from_a_file_meets_a_built_in_one(tmp_path):
     both = meshed(tmp_path)
     mixed = dataclasses.replace(both, body2=plane().body2)

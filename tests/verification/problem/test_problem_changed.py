@@ -11,6 +11,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import fewer
 
 import verification as vf
 from verification.interface.friction import Local
@@ -75,6 +76,7 @@ def test_both_bodies_are_changed_by_one_pair():
     assert BARS.changed(cells=(3, 5)).body2.cells == (5,)
 
 
+@fewer(3)
 @given(strategies.contact_problems())
 def test_no_change_is_no_change(data):
     problem = vf.Problem.from_dict(data, source="my.toml")
@@ -83,6 +85,7 @@ def test_no_change_is_no_change(data):
     assert same.source == "my.toml"
 
 
+@fewer(3)
 @given(strategies.plane_problems(), st.fractions(0, 10**9))
 def test_friction_is_changed_exactly(data, k):
     problem = vf.Problem.from_dict(data)
@@ -91,6 +94,7 @@ def test_friction_is_changed_exactly(data, k):
     assert problem.changed(friction=k) == put(problem, "contact.friction", k)
 
 
+@fewer(3)
 @given(strategies.contact_problems(), strategies.thetas())
 def test_changes_of_different_keys_commute(data, theta):
     problem = vf.Problem.from_dict(data)
@@ -122,28 +126,14 @@ def test_momentum_without_a_theta_takes_its_step_from_rho():
     ("problem", "values", "key", "needed"),
     [
         (PLANE, {"friction": -1}, "contact.friction", "a number >= 0"),
-        (PLANE, {"friction": True}, "contact.friction", "a number >= 0"),
-        (PLANE, {"friction": float("nan")}, "contact.friction", "a number >= 0"),
-        (PLANE, {"law": "coulomb"}, "contact.law", '"nonlocal", "local"'),
-        (PLANE, {"radius": 0}, "contact.radius", "a number > 0"),
-        (PLANE, {"gap": -1}, "contact.gap", "a number >= 0"),
         (PLANE, {"young": (None, 0)}, "body2.young", "a number > 0"),
         (PLANE, {"young": ("1e-29", "1e29")}, "body2.young", "a modulus within 1e+30 times"),
-        (PLANE, {"poisson": ("1/2", None)}, "body1.poisson", "-1 < nu < 0.5"),
         (PLANE, {"cells": (40, 6)}, "body1.cells", "two whole numbers >= 1"),
-        (PLANE, {"cells": (None, (0, 6))}, "body2.cells", "whole number"),
-        (PLANE, {"cells": (None, (1000, 1000))}, "body2.cells", "at most 250000 cells"),
         (PLANE, {"young": 3}, "young", "two values, for body 1 and body 2"),
         (PLANE, {"young": "7e4"}, "young", "None leaves a body as it is"),
         (PLANE, {"young": (1, 2, 3)}, "young", "two values"),
-        (PLANE, {"poisson": 0.3}, "poisson", "two values"),
-        (PLANE, {"cells": 12}, "cells", "two values"),
         (PLANE, {"neumann_body": 3}, "iteration.neumann_body", "one of 1, 2"),
         (PLANE, {"theta": 1}, "iteration.theta", "0 < theta < 1"),
-        (PLANE, {"theta": "automatic"}, "iteration.theta", '"auto"'),
-        (PLANE, {"relaxation": "faster"}, "iteration.relaxation", '"constant", "aitken"'),
-        (PLANE, {"tolerance": 2}, "iteration.tolerance", "0 < tolerance < 1"),
-        (PLANE, {"max_iterations": 0}, "iteration.max_iterations", "a whole number >= 1"),
         (PLANE, {"title": 3}, "title", "a text in quotes"),
         (PLANE, {"title": "half \ud83d"}, "title", "half a surrogate pair"),
         (BARS, {"friction": "0.1"}, "contact.friction", "two bars have no friction"),
@@ -219,19 +209,15 @@ def test_no_keys_are_no_change():
         ("wibble.x", "1", "wibble", "unknown table"),
         ("contact.friction.x", "1", "contact.friction.x", "contact.friction is no table"),
         ("contact.friction", "", "contact.friction", "needed a value"),
-        ("contact.friction", " ", "contact.friction", "needed a value"),
         ("contact.friction", "-0.4", "contact.friction", "a number >= 0"),
-        ("contact.friction", "many", "contact.friction", "a number >= 0"),
         ("contact.friction", "0.4\nlaw = 1", "contact.friction", "a number >= 0"),
         ("contact.friction", "1" * 5000, "contact.friction", "a number >= 0"),
-        ("contact.friction", "nan", "contact.friction", "a number >= 0"),
         ("contact", "0.4", "contact", "a table"),
         ("body1.cells", "[40, 6", "body1.cells", "not a TOML value"),
         ("body1.cells", "[" * 10_000, "body1.cells", "not a TOML value"),
         ("body1.fixed", '["bottom', "body1.fixed", "not a TOML value"),
         ("title", '"a', "title", "not a TOML value"),
         ("", "1", '""', "the name of a key"),
-        ("a b", "1", "a b", "the name of a key"),
         ("contact.", "1", "contact.", "the name of a key"),
         ("title = 1 #", "1", "title = 1 #", "the name of a key"),
         ("title\nx", "1", r"title\nx", "the name of a key"),

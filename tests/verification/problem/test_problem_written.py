@@ -14,6 +14,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import fewer
 from written_problems import BUILT_IN, MESH, documents, problems, texts
 
 import verification as vf
@@ -72,6 +73,7 @@ def test_a_number_of_any_length_is_read_back_exactly(digits):
 # --- dictionaries ---
 
 
+@fewer(3)
 @given(st.data())
 def test_a_problem_is_had_back_from_its_dictionary_and_from_its_json_text(meshes, data):
     problem = data.draw(problems(meshes))
@@ -81,6 +83,7 @@ def test_a_problem_is_had_back_from_its_dictionary_and_from_its_json_text(meshes
     assert vf.Problem.from_dict(document).to_dict() == document
 
 
+@fewer(3)
 @given(st.data())
 def test_equal_problems_are_written_walked_and_keyed_alike(meshes, data):
     document = data.draw(documents(meshes))
@@ -135,6 +138,7 @@ def test_the_dictionary_of_section_6_is_the_one_of_its_file():
 # --- problem files ---
 
 
+@fewer(3)
 @given(st.data())
 def test_a_problem_is_had_back_from_its_file_wherever_that_is_kept(meshes, tmp_path_factory, data):
     problem = data.draw(problems(meshes))
@@ -245,6 +249,7 @@ def test_what_toml_does_not_know_is_refused(value):
 # --- keys ---
 
 
+@fewer(3)
 @given(st.data())
 def test_what_changes_no_number_changes_no_key(meshes, data):
     problem = data.draw(problems(meshes))
@@ -310,6 +315,7 @@ def test_the_key_of_section_6_is_that_of_a_text_without_title_and_units():
 # --- values ---
 
 
+@fewer(3)
 @given(st.data())
 def test_a_problem_is_a_value(meshes, data):
     problem = data.draw(problems(meshes))

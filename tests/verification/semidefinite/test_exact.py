@@ -6,7 +6,7 @@ from itertools import count, islice, product
 import numpy as np
 import pytest
 from chain_problems import case, every_piece
-from problem_list import blocks
+from problem_list import blocks, small
 from strategies import AT_NIGHT
 
 import verification as vf
@@ -16,7 +16,7 @@ from verification.semidefinite.interior_point import LMIError, Stop
 from verification.semidefinite.lipschitz import Leaf, budget, enclose
 from verification.semidefinite.multipliers import QuadraticForms
 
-THETA = 0.7
+THETA, SECTION_6 = 0.7, vf.Problem.from_dict(small())
 
 #: Problems with friction whose 6^n pieces can be counted.
 SMALL = list(islice((seed for seed in count() if 1 < (p := case(seed)[0]).contact.grid.n <= 3 and p.friction), 10))
@@ -27,7 +27,7 @@ def sides(piece):
     return piece.pattern.sliding * piece.sign
 
 
-@pytest.mark.parametrize("seed", SMALL if AT_NIGHT else SMALL[:6])
+@pytest.mark.parametrize("seed", SMALL if AT_NIGHT else SMALL[:4])
 def test_the_largest_norm_of_all_pieces_lies_between_the_bounds(seed):
     pair, measured, theta, _ = case(seed)
     most = max(piece.factor(theta) for piece in every_piece(pair))
@@ -38,7 +38,7 @@ def test_the_largest_norm_of_all_pieces_lies_between_the_bounds(seed):
     assert found.piece.factor(theta) == found.lower
 
 
-@pytest.mark.parametrize("seed", SMALL[:5])
+@pytest.mark.parametrize("seed", SMALL[: 5 if AT_NIGHT else 3])
 def test_with_all_signs_fixed_the_multipliers_bound_the_pieces_with_these_signs(seed):
     """They are not attained always: at seed 27 they prove 1.37 where no piece has more than 0.86."""
     pair, measured, theta, _ = case(seed)
@@ -60,10 +60,12 @@ def test_a_sign_that_a_piece_does_not_have_proves_less_than_the_piece_shows():
         if sides(worst).any():
             proved = forms.on(replace(forms.everywhere, signs=signs), theta)[0].value
             below += proved < worst.factor(theta) * (1 - 1e-6)
+        if below > 2:
+            break
     assert below > 2
 
 
-@pytest.mark.parametrize("seed", SMALL[:5])
+@pytest.mark.parametrize("seed", SMALL[: 5 if AT_NIGHT else 3])
 def test_on_a_single_piece_the_multipliers_prove_its_norm(seed):
     pair, measured, theta, random = case(seed)
     forms, pieces = QuadraticForms(pair, measured), list(every_piece(pair))
@@ -78,7 +80,7 @@ def test_on_a_single_piece_the_multipliers_prove_its_norm(seed):
         assert pieces[i].factor(theta) <= proved <= pieces[i].factor(theta) * (1 + 1e-3)
 
 
-@pytest.mark.parametrize("seed", SMALL[:4])
+@pytest.mark.parametrize("seed", SMALL[: 4 if AT_NIGHT else 2])
 def test_to_fix_something_never_proves_more_than_its_parent_and_one_of_both_proves_as_much_as_a_piece(seed):
     pair, measured, theta, random = case(seed)
     forms, n = QuadraticForms(pair, measured), pair.contact.grid.t
@@ -92,7 +94,7 @@ def test_to_fix_something_never_proves_more_than_its_parent_and_one_of_both_prov
 
 
 def test_without_friction_the_first_program_is_attained():
-    for seed in range(0, 30, 3):
+    for seed in range(0, 12, 3):
         pair, measured, theta, _ = case(seed, friction=0)
         found = enclose(pair, QuadraticForms(pair, measured), theta, gap=1e-6, programs=None)
         assert found.programs == 1
@@ -100,11 +102,16 @@ def test_without_friction_the_first_program_is_attained():
 
 
 def two_blocks(**changes):
-    data = blocks(cells=((8, 3), (8, 3)), contact={"friction": "1/2", "radius": "1/4"}, iteration={"theta": "1/2"})
+    data = blocks(cells=((6, 2), (6, 2)), contact={"friction": "1/2", "radius": "1/4"}, iteration={"theta": "1/2"})
     return vf.Problem.from_dict(data).changed(**changes)
 
 
-def test_an_answer_is_the_same_each_time_and_more_programs_come_closer():
+def test_an_answer_is_the_same_each_time_more_programs_come_closer_and_no_node_is_divided_twice_in_one_way():
+    def paths(tree, before):
+        if isinstance(tree, Leaf):
+            return [before]
+        return [path for part in tree.cases for path in paths(part, [*before, (tree.name, tree.node)])]
+
     pair = vf.build(two_blocks())
     forms = QuadraticForms(pair, vf.measure(pair))
     one, two = (enclose(pair, forms, 0.5, gap=1e-9, programs=5) for _ in range(2))
@@ -115,23 +122,14 @@ def test_an_answer_is_the_same_each_time_and_more_programs_come_closer():
     assert more.programs > one.programs
     assert more.upper.value <= one.upper.value
     assert more.lower >= one.lower
+    found = paths(more.tree, [])
+    assert max(map(len, found)) > 2
+    assert all(len(path) == len(set(path)) for path in found)
 
 
 def leaves(tree):
     """The sets of pieces into which all were divided."""
     return [tree] if isinstance(tree, Leaf) else [leaf for part in tree.cases for leaf in leaves(part)]
-
-
-def test_no_set_of_pieces_is_divided_twice_at_one_node_in_the_same_way():
-    def paths(tree, before):
-        if isinstance(tree, Leaf):
-            return [before]
-        return [path for part in tree.cases for path in paths(part, [*before, (tree.name, tree.node)])]
-
-    pair = vf.build(two_blocks())
-    found = paths(enclose(pair, QuadraticForms(pair, vf.measure(pair)), 0.5, gap=1e-9, programs=12).tree, [])
-    assert max(map(len, found)) > 2
-    assert all(len(path) == len(set(path)) for path in found)
 
 
 class Loose(QuadraticForms):
@@ -166,8 +164,8 @@ def test_fewer_programs_are_allowed_the_larger_the_interface():
     assert budget(100) == 1
 
 
-def test_a_comparison_carries_both_bounds_and_they_come_closer_when_asked():
-    quick, exact = (vf.compare(two_blocks(), exact=exact).to_dict()["lmi"] for exact in (False, True))
+def test_a_comparison_carries_both_bounds_and_they_come_closer_when_asked(known_bounds):
+    quick, exact = (vf.compare(SECTION_6, exact=exact).to_dict()["lmi"] for exact in (False, True))
     for found in (quick, exact):
         assert found["gap"] == pytest.approx(found["lipschitz"]["value"] / found["lower"] - 1)
         assert found["lower"] <= found["lipschitz"]["value"]
@@ -180,7 +178,7 @@ def test_from_the_start_of_a_parent_the_solver_comes_to_the_same_bound_in_fewer_
     forms = QuadraticForms(pair, vf.measure(pair))
     parent = forms.everywhere.where("signs", 6, 1).where("normal", 0, 1).where("normal", 2, -1)
     steps = []  # of one program alone they may change by dozens with the last digit of E
-    for pieces in (forms.everywhere, parent.where("slip", 6, 1), parent.where("slip", 6, -1)):
+    for pieces in (forms.everywhere, parent.where("slip", 6, -1)):
         parent, proposal = pieces, forms.on(pieces, THETA)[1]
         for change in ((3, 1), (1, -1), (4, -1)):
             pieces = parent.where("signs", *change)

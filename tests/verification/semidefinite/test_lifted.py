@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg
-from problem_list import changed, plates
+from problem_list import changed, small
 
 import verification as vf
 from verification.interface.body import NO_MOTIONS
@@ -15,7 +15,7 @@ from verification.semidefinite import model
 from verification.semidefinite.lipschitz import enclose
 from verification.semidefinite.multipliers import QuadraticForms
 
-LIFTED = plates(
+LIFTED = small(
     body2={"prescribed": {"left": [0, "free"]}, "traction": {"top": [0, -3000]}},
     contact={"interval": ["0.6", "1.6"]},
     iteration={"theta": "0.5"},

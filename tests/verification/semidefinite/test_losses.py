@@ -178,15 +178,6 @@ def random_sides(case: Case, random: np.random.Generator) -> Sides:
 # --- each inequality by itself ----------------------------------------------------------------------------------------
 
 
-@strategies.fewer(10, at_night=5)
-@given(seed=seeds)
-def test_no_inequality_gives_away_less_than_nothing(seed):
-    losses = case_of(seed).losses
-    for loss in (*losses.links, *losses.friction, *losses.lipschitz):
-        if "lost" not in loss.label:  # no inequality: the printed bound is the smaller one where m < 1
-            assert loss.decades > -1e-12
-
-
 @strategies.fewer(4)
 @given(data=strategies.contact_problems())
 def test_a_link_without_T_gives_away_what_the_eigenvalue_of_a_dense_pencil_says(data):
@@ -207,7 +198,7 @@ def test_a_link_without_T_gives_away_what_the_eigenvalue_of_a_dense_pencil_says(
     assert [loss.label for loss in case.losses.links if not loss.searched] == list(EIGENVALUES)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(6 if strategies.AT_NIGHT else 3))
 def test_two_forces_attain_the_links_without_T(seed):
     """(5.19), (5.22), (5.23) by the worst psi - psi~; (5.18), (5.29) while all nodes stick: w^1 moves with w^2."""
     found, random = rubbing(seed), np.random.default_rng(seed)
@@ -242,7 +233,7 @@ def test_no_two_forces_come_closer_to_equality_in_a_link_without_T(seed):
 @pytest.mark.parametrize("label", SEARCHED)
 def test_two_forces_attain_a_searched_link_for_suitable_loads(label):
     """The piece that the search finds, with its own forms from dense matrices."""
-    for seed in range(6):
+    for seed in range(6 if strategies.AT_NIGHT else 3):
         found = rubbing(seed)
         sides = found.realised(label, found.search(label).piece, np.random.default_rng(seed))
         assert found.decades(label, sides) == pytest.approx(found.links[label], abs=1e-5)
@@ -250,7 +241,7 @@ def test_two_forces_attain_a_searched_link_for_suitable_loads(label):
 
 def test_the_search_comes_closer_to_equality_than_random_forces():
     """Forces on different pieces included."""
-    for seed in range(12 if strategies.AT_NIGHT else 6):
+    for seed in range(12 if strategies.AT_NIGHT else 3):
         found, random = case_of(seed), np.random.default_rng(seed)
         for _ in range(8):
             sides = random_sides(found, random)
@@ -261,31 +252,34 @@ def test_the_search_comes_closer_to_equality_than_random_forces():
 # --- the chains -------------------------------------------------------------------------------------------------------
 
 
-@strategies.fewer(10, at_night=5)
-@given(seed=seeds)
-def test_the_chain_from_T_to_its_bound_adds_up(seed):
-    """From the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to the root of (5.38)."""
-    found = case_of(seed)
+@strategies.fewer(5)
+@given(seed=seeds, k=st.sampled_from([None, "1/100", "1/2", "1"]))
+@example(seed=110666, k="1/100")  # neighbours were found worse that are not, by rounding: the search took another way
+def test_both_chains_add_up_and_no_link_gives_away_less_than_nothing(seed, k):
+    """From the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to the root of (5.38).
+
+    From the largest friction term found to (5.30) repaired, and from there to what is printed.
+    """
+    found = case_of(seed, k)
+    losses = found.losses
+    for loss in (*losses.links, *losses.friction, *losses.lipschitz):
+        if "lost" not in loss.label:  # no inequality: the printed bound is the smaller one where m < 1
+            assert loss.decades > -1e-12
     largest = sqrt(found.search("(5.38)").value)
     bound = found.M * found.C_R * found.X * found.M / found.m**2
-    total = sum(loss.decades for loss in found.losses.lipschitz)
+    total = sum(loss.decades for loss in losses.lipschitz)
     assert total == pytest.approx(log10(bound / largest), abs=1e-7)
     assert total == pytest.approx(found.links["(5.38)"] / 2, abs=1e-7)
     assert bound == pytest.approx(sqrt(bounds.Q(found.C_K, found.m, found.M, found.C_R)), rel=1e-9)
-    assert [loss.label for loss in found.losses.lipschitz] == ["(5.22)", "(5.18)", "(5.11)", "(5.19)", "(5.23)"]
-
-
-@strategies.fewer(10, at_night=5)
-@given(seed=seeds, k=st.sampled_from(["1/100", "1/2", "1"]))
-@example(seed=110666, k="1/100")  # neighbours were found worse that are not, by rounding: the search took another way
-def test_the_chain_from_the_friction_term_to_its_bound_adds_up(seed, k):
-    """To (5.30) repaired, and from there to what is printed."""
-    found = case_of(seed, k)
-    F = found.search("(5.30)").value
-    *proof, printed = found.losses.friction
+    assert [loss.label for loss in losses.lipschitz] == ["(5.22)", "(5.18)", "(5.11)", "(5.19)", "(5.23)"]
+    if not losses.friction:
+        assert found.C_K == 0
+        return
+    *proof, printed = losses.friction
     assert [loss.label for loss in proof] == ["(5.13)", "(5.11)", "(5.19)", "(5.23)"]
-    assert sum(loss.decades for loss in proof) == pytest.approx(log10(found.P(REPAIRED) / F), abs=1e-7)
-    assert sum(loss.decades for loss in proof) == pytest.approx(found.links["(5.30)"], abs=1e-7)
+    total = sum(loss.decades for loss in proof)
+    assert total == pytest.approx(log10(found.P(REPAIRED) / found.search("(5.30)").value), abs=1e-7)
+    assert total == pytest.approx(found.links["(5.30)"], abs=1e-7)
     assert printed.decades == pytest.approx(log10(found.P(PRINTED) / found.P(REPAIRED)), abs=1e-9)
 
 

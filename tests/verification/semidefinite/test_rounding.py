@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from chain_problems import case
 from problem_list import blocks
+from rational_forms import exact, form_of, is_definite, rational
 from strategies import AT_NIGHT
 
 import verification as vf
@@ -18,26 +19,6 @@ from verification.interface.pair import pair_from
 from verification.semidefinite.interior_point import LMIError
 from verification.semidefinite.multipliers import QuadraticForms
 
-Exact = list[list[Fraction]]
-
-
-def exact(matrix: np.ndarray) -> Exact:
-    return [[Fraction(float(v)) for v in row] for row in matrix]
-
-
-def definite(matrix: Exact) -> bool:
-    """By elimination in rationals: all pivots are positive."""
-    rows = [list(row) for row in matrix]
-    for i, pivot in enumerate(rows):
-        if not pivot[i] > 0:
-            return False
-        for other in rows[i + 1 :]:
-            factor = other[i] / pivot[i]
-            if factor:
-                for j in range(i, len(rows)):
-                    other[j] -= factor * pivot[j]
-    return True
-
 
 def test_what_is_called_definite_is_so_in_rationals_however_close_to_singular():
     """``L D L'`` with one pivot down to 1e-18 of either sign, rounded once."""
@@ -46,14 +27,13 @@ def test_what_is_called_definite_is_so_in_rationals_however_close_to_singular():
     count = 4000 if AT_NIGHT else 1000
     for _ in range(count):
         n = int(random.integers(2, 5))
-        L = exact(np.tril(random.uniform(-1, 1, (n, n)), -1) + np.eye(n))
-        D = [Fraction(float(v)) for v in random.uniform(0.1, 1, n)]
-        D[int(random.integers(n))] = Fraction(float(random.choice([-1, 1]) * 10.0 ** random.uniform(-18, -12)))
-        A = [[sum(L[i][k] * D[k] * L[j][k] for k in range(n)) for j in range(n)] for i in range(n)]
-        rounded = np.array([[float(v) for v in row] for row in A])
+        L, D = exact(np.tril(random.uniform(-1, 1, (n, n)), -1) + np.eye(n)), exact(random.uniform(0.1, 1, n))
+        D[int(random.integers(n))] = rational(random.choice([-1, 1]) * 10.0 ** random.uniform(-18, -12))
+        A = L * D @ L.T
+        rounded = np.array([[float(Fraction(int(v.p), int(v.q))) for v in row] for row in A])
         found = positive_definite(Enclosed(middle=rounded, radius=2 * UNIT * np.abs(rounded)))
         said[found] += 1
-        assert definite(A) or not found
+        assert is_definite(A) or not found
     assert min(said.values()) > count / 10
 
 
@@ -66,78 +46,14 @@ def test_what_is_large_does_not_hide_what_is_small():
         assert not positive_definite(Enclosed(middle=A * scale, radius=1.5 * radius * scale))
 
 
-def test_a_matrix_that_is_not_finite_is_not_definite():
-    for entry in (np.nan, np.inf, 0.0, -1.0):
-        assert not positive_definite(Enclosed(middle=np.array([[entry]]), radius=np.zeros((1, 1))))
-
-
-def test_the_rounding_of_entries_products_and_forms_alone_is_enclosed():
-    """Matrices without a radius of their own, so that nothing else covers what rounding adds."""
-    random = np.random.default_rng(3)
-    for n in (1, 2, 5):
-        rationals = np.array([Fraction(int(p), int(q)) for p, q in random.integers(1, 99, (n * n, 2))]).reshape(n, n)
-        rounded = Enclosed.rounded(rationals)
-        A, B = random.standard_normal((2, n, n))
-        product = Enclosed.exactly(A).times(Enclosed.exactly(B))
-        to_fractions = np.vectorize(lambda v: Fraction(float(v)), otypes=[object])
-        for found, true in ((rounded, rationals), (product, to_fractions(A) @ to_fractions(B))):
-            assert (np.abs(to_fractions(found.middle) - true) <= to_fractions(found.radius)).all()
-        cancels = np.diag([1.0, 0.0, 0.0]) @ np.ones((3, 3)), np.array([0.1, 0.2, -0.3])  # a row that loses all digits
-        for X, x in ((A, random.standard_normal(n)), cancels):
-            low, high = Enclosed.exactly(X).form(x)
-            assert Fraction(low) <= to_fractions(x) @ to_fractions(X) @ to_fractions(x) <= Fraction(high)
-            assert high - low <= 1e-13 * (np.abs(x) @ np.abs(X) @ np.abs(x))
-
-
 # --- the semidefinite bound -----------------------------------------------------------------------------------------
 
 
-def product(a: Exact, b: Exact) -> Exact:
-    columns = list(zip(*b, strict=True))
-    return [
-        [sum((x * y for x, y in zip(row, column, strict=True) if x and y), Fraction(0)) for column in columns]
-        for row in a
-    ]
-
-
-def transposed(a: Exact) -> Exact:
-    return [list(column) for column in zip(*a, strict=True)]
-
-
-def exact_form(pair, multipliers, theta: float, square: Fraction) -> Exact:
-    """``[[S_2, M], [M', Q]]`` in (x, d, c): ``g = S_2 d``, ``p = S_1 c``, the jump -(d + c), in rationals throughout.
-
-    Positive definite if and only if ``square |g|^2 - |theta p + (1 - theta) g|^2 - conditions`` is.
-    """
-    n, size = pair.contact.grid.n, pair.contact.grid.size
-    S_1, S_2, R = (exact(m) for m in (pair.contact.schur, pair.neumann.schur, pair.interface.kernel))
-    k, t = Fraction(float(pair.friction)), Fraction(theta)
-    w = [Fraction(float(v)) for v in pair.contact.grid.weights]
-    lam, tau, a, b = ([Fraction(float(v)) for v in m] for m in multipliers)
-    zero = [[Fraction(0)] * size for _ in range(size)]
-    step = [[(1 - t) * v for v in g] + [t * v for v in p] for g, p in zip(S_2, S_1, strict=True)]
-    form = [[2 * square * v for v in row] + z for row, z in zip(S_2, zero, strict=True)]
-    form += [[Fraction(0)] * (2 * size) for _ in range(size)]
-    force = [[Fraction(0)] * size + row for row in S_1]
-    jump = [[Fraction(-1) if i in (j, j + size) else Fraction(0) for i in range(2 * size)] for j in range(size)]
-    zeta = [row + [Fraction(0)] * size for row in product(R, S_2[n:])]
-
-    def subtract(weight: Fraction, left: list[Fraction], right: list[Fraction]) -> None:
-        for i, x in enumerate(left):
-            if x:
-                for j, y in enumerate(right):
-                    if y:
-                        form[i][j] -= weight * x * y
-                        form[j][i] -= weight * x * y
-
-    for j in range(n):
-        subtract(lam[j], force[n + j], jump[n + j])
-        subtract(tau[j], force[j], jump[j])
-        subtract(w[j] * k * a[j], zeta[j], zeta[j])
-        subtract(w[j] * k * b[j], jump[j], jump[j])
-    form = [[v / 2 for v in row] for row in form]
-    top = [s + m for s, m in zip(S_2, step, strict=True)]
-    return top + [m + row for m, row in zip(transposed(step), form, strict=True)]
+def proved(pair, multipliers, theta: float, square: Fraction) -> bool:
+    """True if multipliers prove the square of a factor in rationals."""
+    wk = exact(pair.contact.grid.weights) * rational(float(pair.friction))
+    given = {"step": (theta, 1 - Fraction(theta)), "wk": wk, "kernel": pair.interface.kernel}
+    return is_definite(form_of(pair.contact.schur, pair.neumann.schur, multipliers, square, **given))
 
 
 def slender(length: int) -> vf.Problem:
@@ -162,10 +78,8 @@ def test_the_multipliers_prove_the_factor_in_rationals(seed):
     _, tau, a, b = found.multipliers
     assert min(m.min() for m in found.multipliers) >= 0
     assert all(4 * Fraction(x) * Fraction(y) >= Fraction(z) ** 2 for x, y, z in zip(a, b, tau, strict=True))
-    assert definite(exact_form(pair, found.multipliers, theta, Fraction(found.value) ** 2 * (1 + Fraction(1, 10**15))))
-    assert not definite(
-        exact_form(pair, found.multipliers, theta, Fraction(found.value) ** 2 * (1 - Fraction(1, 10**5)))
-    )
+    assert proved(pair, found.multipliers, theta, Fraction(found.value) ** 2 * (1 + Fraction(1, 10**15)))
+    assert not proved(pair, found.multipliers, theta, Fraction(found.value) ** 2 * (1 - Fraction(1, 10**5)))
 
 
 @pytest.mark.parametrize(("length", "condition"), [(10**2, 1e7), (10**3, 1e9), (10**4, 1e11), (5 * 10**4, 1e12)])
@@ -175,7 +89,7 @@ def test_near_singular_stiffness_makes_the_factor_larger_never_too_small(length,
     assert np.linalg.cond(pair.contact.schur) > condition
     found = QuadraticForms(pair, measure(pair)).factor(0.5)
     assert found.evaluated < found.value < 1.001 * found.evaluated
-    assert definite(exact_form(pair, found.multipliers, 0.5, Fraction(found.value) ** 2 * (1 + Fraction(1, 10**15))))
+    assert proved(pair, found.multipliers, 0.5, Fraction(found.value) ** 2 * (1 + Fraction(1, 10**15)))
 
 
 def test_where_rounding_hides_what_the_multipliers_leave_nothing_is_claimed(monkeypatch):

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import strategies
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from problem_list import changed
@@ -48,6 +49,7 @@ def bounded(name, k):
 
 
 @pytest.mark.parametrize("name", BODIES)
+@strategies.fewer(4)
 @given(data=st.data())
 def test_an_error_of_slip_grows_by_the_factor_of_the_theorem_at_most(name, data):
     k = data.draw(st.sampled_from(["0", "0.05", "0.1", "0.2", "0.3"]))
@@ -91,7 +93,7 @@ def test_where_all_nodes_stick_an_error_of_slip_stays_as_it_is():
 # --- bounds by multipliers, and pairs ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("k", ["0.02", "0.2", "0.3"])
+@pytest.mark.parametrize("k", ["0.02", "0.3"])
 @pytest.mark.parametrize("name", BODIES)
 def test_a_pair_attains_the_factor_found_and_lies_below_the_bound_which_is_not_above_the_closed_one(name, k):
     errors = bounded(name, k)

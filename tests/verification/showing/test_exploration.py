@@ -33,8 +33,16 @@ ROUNDED = 1 / 100
 NEAREST = 0.5 / 127 + 0.5e-3
 
 
+@pytest.fixture(scope="module", autouse=True)
+def few():
+    """Each friction is twenty runs in each role, or a history: three of the five frictions are enough."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "SHARES", page.SHARES[::2])
+        yield
+
+
 @pytest.fixture(scope="module")
-def found():
+def found(few):
     return vf.explore(plates(10))
 
 
@@ -154,7 +162,7 @@ def test_a_contact_body_so_soft_that_the_predicted_theta_is_nearly_1_is_explored
 
 
 def test_a_body_that_contact_alone_holds_keeps_its_role():
-    loose = vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.2").to_dict()
+    loose = vf.example("section6").changed(cells=((5, 2), (3, 2)), radius="0.4").to_dict()
     loose["body2"] |= {"prescribed": {"top": ["free", "-0.01"]}}
     found = vf.explore(vf.Problem.from_dict(loose))
     assert len(found.films) == 1
@@ -273,7 +281,7 @@ def with_history(**tables):
 
 
 @pytest.fixture(scope="module")
-def followed():
+def followed(few):
     return vf.explore(with_history(**VARIANTS["grids that differ"]))
 
 
@@ -331,7 +339,7 @@ def test_a_history_that_ends_early_says_why_and_one_without_a_first_increment_is
         return march(pair)
 
     monkeypatch.setattr(page, "march", picky)
-    assert vf.explore(with_history()).frictions == (0, Fraction(1, 10), Fraction(1, 5))
+    assert vf.explore(with_history()).frictions == (0, Fraction(1, 5))
     with pytest.raises(ContactError):
         vf.explore(with_history(contact={"friction": "0.3"}))
 
@@ -341,7 +349,7 @@ def test_a_history_of_bars_and_of_a_pair_at_its_own_friction_is_shown():
     found = vf.explore(vf.Problem.from_dict(bars() | {"step": steps}))
     assert data_of(found)["past"]["axis"] == 1
     pair = vf.build(with_history()).at(friction="0.1")
-    assert vf.explore(pair).histories[2].increments[0].run.pair.friction == Fraction(1, 10)
+    assert vf.explore(pair).histories[1].increments[0].run.pair.friction == Fraction(1, 10)
 
 
 @pytest.fixture(scope="module")
@@ -367,7 +375,7 @@ return { text: document.querySelector(".answer").textContent, most: document.que
 @needs_browser
 def test_a_slider_moves_through_the_increments_of_a_march(followed, opened_history):
     farthest = 0.0
-    for k, i in [(0, 0), (2, 8), (2, 18), (4, 26), (2, 29)]:
+    for k, i in [(0, 0), (1, 8), (1, 18), (2, 26), (1, 29)]:
         history = vf.march(followed.problem.changed(friction=followed.frictions[k]))
         each, seen = history.increments[i], opened_history.execute_script(GO, k, i)
         contact = each.contact

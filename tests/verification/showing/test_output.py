@@ -135,7 +135,6 @@ def test_a_figure_that_files_do_not_list_replaces_nothing(quick, results, tmp_pa
     assert [path.name for path in tmp_path.iterdir()] == ["bodies.svg"]
 
 
-@pytest.mark.usefixtures("known_bounds")
 def test_a_report_that_fails_leaves_the_comparison_before_it(quick, comparison, tmp_path, monkeypatch):
     """The document of another theta beside an old report would be two runs in one folder."""
     write(tmp_path, "comparison", comparison)
@@ -146,7 +145,7 @@ def test_a_report_that_fails_leaves_the_comparison_before_it(quick, comparison, 
 
     monkeypatch.setattr("verification.output.report.report", fail)
     with pytest.raises(vf.ProblemError, match="No space left"):
-        write(tmp_path, "comparison", vf.compare(problem(iteration=ONE_STEP)))
+        write(tmp_path, "comparison", replace(comparison, run=vf.run(problem(iteration=ONE_STEP))))
     assert contents(tmp_path) == before
 
 
@@ -259,8 +258,9 @@ def test_an_edited_problem_is_not_overwritten(tmp_path):
     assert (tmp_path / "problem.toml").read_text() == "a = 2\n"
 
 
-def test_the_figures_that_are_written_can_be_overwritten(comparison, written, tmp_path):
+def test_the_figures_that_are_written_can_be_overwritten(quick, comparison, written, tmp_path):
     for path in written.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
     write(tmp_path, "comparison", comparison)
-    assert contents(tmp_path) == contents(written)
+    differ = {name for name, content in contents(tmp_path).items() if content != contents(written)[name]}
+    assert differ == {name for name in WRITTEN["comparison"] if name.endswith(("svg", "png", "html"))}

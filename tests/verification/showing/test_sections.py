@@ -14,6 +14,7 @@ import verification as vf
 from ndtheory import Number
 from verification import FILLS, registry
 from verification.bounds.bound import Bound, BoundResult, Thresholds
+from verification.certificate import continuum
 from verification.cli import main
 from verification.document import Document
 from verification.output.report import report
@@ -44,8 +45,11 @@ NO_FIGURES: dict[str, str] = {}
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, Document]:
-    return {name: make(problem(10)) for name, make in ALL.items()}
+def results(shared) -> dict[str, Document]:
+    bounded = continuum.bounded
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(continuum, "bounded", lambda model: shared(("continuum", model), lambda: bounded(model)))
+        return {name: make(problem(10)) for name, make in ALL.items()}
 
 
 def terminal(result) -> str:
@@ -214,7 +218,7 @@ def test_a_title_that_is_renamed_in_its_one_place_is_renamed_everywhere(results,
     assert after == (before[0].replace(old.capitalize(), new.capitalize()), before[1].replace(old, new))
     file = tmp_path / "problem.toml"
     file.write_text(problem(10).to_toml(), encoding="utf-8")
-    assert main(["compare", str(file)]) == 0
+    assert main(["compare", str(file), "--bounds", "energy"]) == 0
     assert new in (out := capsys.readouterr().out)
     assert old not in out
 
@@ -262,16 +266,17 @@ class ByPrograms(MadeUp):
 def test_a_bound_that_is_registered_is_shown_everywhere(monkeypatch, capsys, tmp_path):
     for bound in (MadeUp(), ByPrograms()):
         monkeypatch.setitem(BOUNDS, bound.name, bound)
-    result = vf.compare(problem(10))
+    bounds = ("made-up", "by-programs")
+    result = vf.compare(problem(10), bounds=bounds)
     file = tmp_path / "problem.toml"
     file.write_text(problem(10).to_toml(), encoding="utf-8")
-    assert main(["compare", str(file)]) == 0
+    assert main(["compare", str(file), "--bounds", ",".join(bounds)]) == 0
     for said in (
         words(capsys.readouterr().out),
         page_words(result._repr_html_()),
         page_words(report(result, NO_FIGURES)),
     ):
-        for name in ("made-up", "by-programs"):
+        for name in bounds:
             assert f"{name} 0.432 0.876 (0, 0.625) 0.875 contracts" in said
             assert f"{name}: of no theorem, in MPa" in said
             assert f"{name} consistent" in said

@@ -370,13 +370,13 @@ def test_a_figure_has_a_curve_for_each_value_of_a_third_column(wide):
         wide.plot("theta", "law")
 
 
-def test_what_sixteen_frictions_keep_at_121_contact_nodes_stays_below_100_megabytes(capfd):
-    """Beside the pair; with all pieces of each friction it was 0.7 GB, and processes were ended for it."""
+def test_what_six_frictions_keep_at_121_contact_nodes_stays_below_100_megabytes(capfd):
+    """Beside the pair; with all pieces of each of 16 frictions it was 0.7 GB, and processes were ended for it."""
     contact_model()  # importing it takes memory of its own
     fine = vf.example("section6").changed(cells=((200, 3), (120, 3)))
     bodies = SharedBodies(fine)
     assert bodies.setting({}).pair.contact.grid.n == 121
-    frictions, theta, most = [Fraction(i, 20) for i in range(1, 17)], Fraction(3, 10), []
+    frictions, theta, most = [Fraction(i, 20) for i in (1, 4, 7, 10, 13, 16)], Fraction(3, 10), []
     tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]

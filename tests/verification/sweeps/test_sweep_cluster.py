@@ -20,7 +20,7 @@ pytest.importorskip("distributed", reason="the extra `cluster` is not installed:
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 GRID = {"theta": [f"{n}/40" for n in range(1, 40)], "friction": [0, "1/5", "2/5"]}
 
-#: Each starts a scheduler and its workers, some 8 s; the first test does so every day.
+#: Each starts a scheduler and its workers as processes, some 8 s.
 at_night = pytest.mark.skipif(not AT_NIGHT, reason="in the nightly profile")
 
 #: Seconds for a process of dask to come up.
@@ -85,6 +85,19 @@ def once(when, act):
     return tell
 
 
+def test_rows_are_those_of_one_process(tmp_path):
+    """Both workers are threads of this process, with sockets between them."""
+    from distributed import LocalCluster
+
+    few, place = GRID | {"theta": GRID["theta"][::4]}, tmp_path / "rows.sqlite"
+    options = {"processes": False, "protocol": "tcp://", "dashboard_address": None}
+    with LocalCluster(n_workers=2, threads_per_worker=1, **options) as up:
+        found = vf.sweep(SMALL, **few, dask=up.scheduler_address, store=place)
+    assert found.rows == vf.sweep(SMALL, **few).rows
+    assert plan(SMALL, SweepGrid.of(few), place).left == 0
+
+
+@at_night
 def test_rows_are_those_of_one_process_though_a_worker_is_killed_half_way(cluster, tmp_path):
     up = cluster()
     place = tmp_path / "rows.sqlite"
