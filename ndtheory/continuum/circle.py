@@ -18,8 +18,10 @@ both ends, and by one number: :class:`Pencil`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from ndtheory.continuum.intervals import Interval
 from ndtheory.continuum.strip import MOST_PARTS, Part, Strip, Unproved, halves, line, smooth, times_smooth
@@ -53,6 +55,11 @@ class Multipliers:
     normal: Scalar
     alpha: Scalar
     beta: Scalar
+
+    @property
+    def enclosed(self) -> Multipliers:
+        """The same as intervals."""
+        return Multipliers(**{name: Interval.of(value) for name, value in vars(self).items()})
 
 
 @dataclass(frozen=True)
@@ -150,14 +157,40 @@ class TwoLayers:
         >>> layers.contracts(disk(Fraction(7, 10), Fraction(36, 100)), by)
         True
         """
-        multipliers = Multipliers(**{name: Interval.of(value) for name, value in vars(by).items()})
+        multipliers = by.enclosed
         circle = (Interval.of(ends[0]), Interval.of(ends[1]))
+        return self._everywhere(lambda part: _definite(pencil(*self._at(part, multipliers, circle))))
+
+    def contracts_in_energy(self, theta: Fraction, q: Fraction, by: Multipliers, weight: Fraction) -> bool:
+        """True if T_theta is proved to contract by q in the norm (5.21), by the multipliers times a weight > 0.
+
+        There the norm is the energy of the Neumann layer, ``|g|^2 = g' A_n g``, and the form of g and p
+
+            q^2 |g|^2 - |theta p + (1 - theta) g|^2 + weight M(g, p)
+
+        must be positive definite at every wave number, M being that of ``v = A_n g + A_c p``.
+
+        Raises
+        ------
+        Unproved
+        """
+        multipliers, size = by.enclosed, Interval.of(weight)
+        step = (Interval.of(theta), Interval.of(1 - theta), Interval.of(q).square())
+
+        def holds(part: Part) -> bool:
+            contact, neumann, _, scaled, smooth_square = self._at(part, multipliers, ())
+            return _positive(energy_form(contact, neumann, step, scaled, smooth_square, size))
+
+        return self._everywhere(holds)
+
+    def _everywhere(self, holds: Callable[[Part], bool]) -> bool:
+        """Whether something holds on parts of the wave numbers, halved until it does, that cover all of them."""
         parts = line(1 / self.contact.thickness, 1 / self.neumann.thickness, 6 / self.radius)
         for _ in range(MOST_PARTS):
             if not parts:
                 return True
             part = parts.pop()
-            if _definite(self._pencil(part, circle, multipliers)):
+            if holds(part):
                 continue
             lo, hi = part
             if lo * self.radius > 2**12 if hi is None else hi - lo <= (lo or hi) * SHORTEST:
@@ -165,17 +198,57 @@ class TwoLayers:
             parts.extend(halves(part))
         raise Unproved(f"{MOST_PARTS} parts of the wave numbers leave the circle criterion open")
 
-    def _pencil(self, part: Part, ends: tuple[Interval, Interval], by: Multipliers) -> Pencil:
-        """M enclosed on a part of the wave numbers; times xi where both layers are thick beside the waves."""
+    def _at(self, part: Part, by: Multipliers, ends: Any) -> tuple[Symmetric, Symmetric, Any, Multipliers, Interval]:
+        """The arguments of :func:`pencil` on a part; times xi where both layers are thick beside the waves."""
         bodies = (self.contact, self.neumann)
         long = part[0] * min(body.thickness for body in bodies) >= 1
         contact, neumann = (body.over_wave_number(part) if long else body.form(part) for body in bodies)
         flexible = (_inverse(contact, -1), _inverse(neumann, 1))
         if not long:
-            return pencil(*flexible, ends, by, smooth(part, self.radius))
+            return *flexible, ends, by, smooth(part, self.radius)
         fading = Interval.between(0 if part[1] is None else 1 / part[1], 1 / part[0])
         faded = Multipliers(normal=by.normal, alpha=by.alpha, beta=by.beta * fading)
-        return pencil(*flexible, ends, faded, times_smooth(part, self.radius))
+        return *flexible, ends, faded, times_smooth(part, self.radius)
+
+
+def energy_form(
+    contact: Symmetric,
+    neumann: Symmetric,
+    step: tuple[Scalar, Scalar, Scalar],
+    by: Multipliers,
+    smooth_square: Scalar,
+    weight: Scalar,
+) -> list[list[Scalar]]:
+    """The form of :meth:`TwoLayers.contracts_in_energy`, of (g_T, g_N, p_T, p_N); ``step`` is theta, 1 - theta, q^2."""
+    theta, rest, square = step
+    n, c = (((t, x), (x, a)) for t, a, x in (neumann, contact))
+    jump = [[*n[i], *c[i]] for i in (0, 1)]  # v_T and v_N
+    shares = (rest, rest, theta, theta)
+    form = [[-(shares[i] * shares[j] * n[i % 2][j % 2]) for j in range(4)] for i in range(4)]
+    for i in range(4):
+        for j in range(4):
+            if i < 2 and j < 2:
+                form[i][j] += square * n[i][j]
+            taken = by.beta * jump[0][i] * jump[0][j]
+            for component, factor in ((0, 1), (1, by.normal)):
+                for at, other in ((i, j), (j, i)):
+                    if at == 2 + component:
+                        form[i][j] += weight * factor * jump[component][other] / 2
+            form[i][j] -= weight * taken
+    form[1][1] -= weight * by.alpha * smooth_square
+    return form
+
+
+def _positive(form: list[list[Interval]]) -> bool:
+    """Whether a symmetric matrix is proved to be positive definite, by elimination."""
+    rows = [list(row) for row in form]
+    for k in reversed(range(len(rows))):  # the forces of step II first
+        if rows[k][k].lo <= 0:
+            return False
+        for i in range(k):
+            for j in range(i + 1):
+                rows[i][j] = rows[i][j] - rows[k][i] * rows[k][j] / rows[k][k]
+    return True
 
 
 def _inverse(form: tuple[Interval, ...], side: int) -> Symmetric:
