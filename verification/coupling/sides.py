@@ -281,7 +281,7 @@ def _of_sparse(name: str, S: sp.csc_array, inverse: Apply | None) -> tuple[Side,
 
 
 def _tried(name: str, function: Apply, u: Floats, v: Floats, refusal: str, least: float) -> tuple[Floats, float]:
-    """What a function makes of u, and its asymmetry by u and v over their energies, which are ``least`` at least."""
+    """The image of u under a function; its asymmetry by u and v over their energies, which are at least ``least``."""
     Au, Av = function(u), function(v)
     energies = float(u @ Au), float(v @ Av)
     if not min(energies) >= least:

@@ -186,7 +186,7 @@ class SharedBodies:
             return base if roles == base.neumann_body else base.swapped()
         try:
             base = self._base(refine)
-        except ProblemError:  # the roles or the law of the problem do not fit; those of the row may
+        except ProblemError:  # the roles or the law of the problem do not fit; another row may have ones that do
             if not changed:
                 raise
             law = None if {"law", "radius"} & changed.keys() else self._law
@@ -241,7 +241,7 @@ def lost(problem: Problem | ContactPair, values: Mapping[str, Any], words: str) 
 
 
 def _closed(found: Row, why: Mapping[str, str], outcome: str | None = None) -> Row:
-    """Return a row with the reasons of what is None; ``outcome`` is that of a row without a run."""
+    """Return a row with the reasons of what is None; ``outcome`` is for a row without a run."""
     found["outcome"] = outcome or found["outcome"]
     found["reason"] = "; ".join(f"{name}: {' '.join(words.split())}" for name, words in why.items()) or None
     # in a CSV file a "#" begins a comment, in quotes too

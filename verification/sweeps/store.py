@@ -214,7 +214,7 @@ class Store:
     rows : dict
         The rows that are there, by their places in the grid.
     plan : Plan
-        Their number, and those of the rows that are not used.
+        Their number, and how many rows are not used.
     kept : int
         Number of rows that were added.
 

@@ -24,7 +24,8 @@ READ, EXACT, SEEN = "5.9", "x-homogeneity", "2.4"
 SOME = [READ, "C5", EXACT, "5.30", SEEN, "fig-5"]
 
 #: Ids that the interface names.
-NAMED = ["2.1", "prop-5.6.2", "lemma-5.3", "thm-5.9", "C5", "case-2-1", "rem-5.10", "fig-10", "sec-6.2"]
+NAMED = ["2.1", "prop-5.6.2", "lemma-5.3", "thm-5.9", "C5", "case-2-1", "rem-5.10", "x-homogeneity"]
+NAMED += ["fig-10", "sec-6.2"]
 
 #: What a screen or a sheet shows where a program forgot to write a text.
 RAW = re.compile(r"\bNone\b|Fraction\(|\bnan\b|\binf\b|[=:] (?:True|False)\b(?!,)|[\[{]'|array\(|float64")
