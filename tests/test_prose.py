@@ -37,7 +37,7 @@ OPENS = re.compile(r"(?:What|Whether|Who|Whose|Where|When|Which|How|Of|That)\b")
 #: At most so many places have it.
 MOST = {
     "code that knows or speaks": 5,
-    "a chain of that of": 10,
+    "a chain of that of": 9,
     "alone at the end": 5,
     "of its own": 6,
     "stands for is": 1,
