@@ -27,6 +27,7 @@ BUDGET = {
     "verification.coupling": 8550,
     "verification.exploration": 850,
     "verification.figures": 1800,
+    "verification.free_norm": 600,
     "verification.interface": 4400,
     "verification.ledger": 4950,
     "verification.machine": 300,

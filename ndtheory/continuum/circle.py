@@ -159,7 +159,7 @@ class TwoLayers:
         """
         multipliers = by.enclosed
         circle = (Interval.of(ends[0]), Interval.of(ends[1]))
-        return self._everywhere(lambda part: _definite(pencil(*self._at(part, multipliers, circle))))
+        return self._everywhere(lambda part: _definite(pencil(*self.enclosed(part, multipliers, circle))))
 
     def contracts_in_energy(self, theta: Fraction, q: Fraction, by: Multipliers, weight: Fraction) -> bool:
         """True if T_theta is proved to contract by q in the norm (5.21), by the multipliers times a weight > 0.
@@ -178,7 +178,7 @@ class TwoLayers:
         step = (Interval.of(theta), Interval.of(1 - theta), Interval.of(q).square())
 
         def holds(part: Part) -> bool:
-            contact, neumann, _, scaled, smooth_square = self._at(part, multipliers, ())
+            contact, neumann, _, scaled, smooth_square = self.enclosed(part, multipliers, ())
             return _positive(energy_form(contact, neumann, step, scaled, smooth_square, size))
 
         return self._everywhere(holds)
@@ -198,8 +198,10 @@ class TwoLayers:
             parts.extend(halves(part))
         raise Unproved(f"{MOST_PARTS} parts of the wave numbers leave the circle criterion open")
 
-    def _at(self, part: Part, by: Multipliers, ends: Any) -> tuple[Symmetric, Symmetric, Any, Multipliers, Interval]:
-        """The arguments of :func:`pencil` on a part; times xi where both layers are thick beside the waves."""
+    def enclosed(
+        self, part: Part, by: Multipliers, ends: Any
+    ) -> tuple[Symmetric, Symmetric, Any, Multipliers, Interval]:
+        """The arguments of :func:`pencil` enclosed on a part; times xi where both layers are thick beside the waves."""
         bodies = (self.contact, self.neumann)
         long = part[0] * min(body.thickness for body in bodies) >= 1
         contact, neumann = (body.over_wave_number(part) if long else body.form(part) for body in bodies)

@@ -21,20 +21,20 @@ from ndtheory.continuum.circle import Multipliers, Symmetric, TwoLayers, disk, p
 from ndtheory.continuum.strip import Strip, symbols
 from verification.semidefinite.interior_point import Program, solve
 
-#: Wave numbers of a search, from waves longer than any layer is thick to those that neither layers nor kernel see.
-WAVES, LONGEST, SHORTEST = 160, 1e-3, 1e3
+#: Wave numbers of a search between two, by thickness and radius; and two at which nothing changes any more.
+WAVES, BETWEEN, ENDS = 120, (0.03, 60.0), (1e-3, 1e3)
 
 #: Points of the grid of lambda and beta, the first half widths of it in logarithms, and what is left of them each time.
-GRID, WIDTHS, DRAWN_IN = (13, 9), (7.0, 3.0), 0.32
+GRID, WIDTHS, DRAWN_IN = (11, 9), (7.0, 3.0), 0.45
 
-#: How often the grid is drawn in: 7 * 0.32^9 leaves 2e-4 of lambda, where the friction is flat.
-TIMES = 9
+#: How often the grid is drawn in: 7 * 0.45^11 leaves 1e-3 of lambda, where the friction is flat.
+TIMES = 11
 
 #: How well factors and relaxation factors are known.
-NEAR = 1e-6
+NEAR = 1e-5
 
 #: The program in the norm (5.21) has each so many of the wave numbers.
-FEWER = 4
+FEWER = 3
 
 #: The square of the smoothing is at least this, where no alpha would be too large.
 LEAST = 1e-30
@@ -53,18 +53,21 @@ class Search:
 
     Examples
     --------
+    >>> from fractions import Fraction
     >>> from ndtheory.moduli import Moduli
     >>> soft, hard = (Strip(body=Moduli(young=E, poisson="0.3"), thickness=Fraction(3, 10)) for E in (20000, 70000))
     >>> layers = Search(TwoLayers(contact=soft, neumann=hard, radius=Fraction(1, 10)))
-    >>> round(layers.factor(0.7, 0.2), 4), round(layers.friction_threshold, 2)
-    (0.3473, 5.11)
+    >>> round(layers.factor(0.7, 0.2), 4), round(layers.friction_threshold, 1)
+    (0.3473, 5.1)
     """
 
     def __init__(self, layers: TwoLayers) -> None:
         self.layers = layers
         depths = [float(strip.thickness) for strip in (layers.contact, layers.neumann)]
         radius = float(layers.radius)
-        xi = np.geomspace(LONGEST / max(depths), SHORTEST / min(*depths, radius), WAVES)
+        long, short = 1 / max(depths), 1 / min(*depths, radius)
+        inner = np.geomspace(BETWEEN[0] * long, BETWEEN[1] * short, WAVES)
+        xi = np.array([ENDS[0] * long, *inner, ENDS[1] * short])
         self.contact = flexibility(layers.contact, xi, side=-1)
         self.neumann = flexibility(layers.neumann, xi, side=1)
         self.smooth = np.maximum(np.sinc(radius * xi / (2 * np.pi)) ** 4, LEAST)
@@ -79,7 +82,7 @@ class Search:
         for _ in range(TIMES):
             axes = [np.linspace(c - w, c + w, n) for c, w, n in zip(centre, widths, GRID, strict=True)]
             normal, beta = np.exp(axes[0])[:, None], np.exp(np.minimum(axes[1], 0))[None, :] / along
-            alpha = self._largest_alpha(ends, normal, beta)
+            alpha = self.largest_alpha(ends, normal, beta)
             value = 4 * alpha * beta
             best = value if value.max() > 0 else alpha  # nothing is allowed yet: where the least is missing
             i, j = np.unravel_index(int(best.argmax()), best.shape)
@@ -90,7 +93,7 @@ class Search:
         by = Multipliers(normal=float(normal[i, 0]), alpha=float(alpha[i, j]), beta=float(beta[0, j]))
         return Allowed(float(np.sqrt(value[i, j])), by)
 
-    def _largest_alpha(self, ends: tuple[float, float], normal: Floats, beta: Floats) -> Floats:
+    def largest_alpha(self, ends: tuple[float, float], normal: Floats, beta: Floats) -> Floats:
         """The largest alpha for which M is positive semidefinite at all wave numbers; -inf without one."""
         by = Multipliers(normal=normal[..., None], alpha=0.0, beta=beta[..., None])
         form = pencil(self.contact, self.neumann, ends, by, 0.0)
@@ -113,12 +116,12 @@ class Search:
         return None if share is None else 1 - share
 
     def best_theta(self, k: float) -> tuple[float, float] | None:
-        """The theta with the least factor at friction k, to 1e-3, and that factor; None where no theta contracts."""
+        """The theta with the least factor at friction k, to 0.005, and that factor; None where no theta contracts."""
         largest = self.largest_theta(k)
         if largest is None:
             return None
         factor = lambda theta: self.factor(theta, k) or 1.0
-        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": 1e-3})
+        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": 5e-3})
         return float(found.x), float(found.fun)
 
     def energy_factor(self, theta: float, k: float) -> tuple[float, Multipliers, float]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar
 
@@ -11,20 +11,32 @@ from ndtheory import HypothesisError, Number
 from ndtheory.constants import relaxation_factor, take
 from ndtheory.continuum.circle import Multipliers, TwoLayers, disk
 from ndtheory.continuum.strip import Strip, Unproved
-from ndtheory.keys import Part, key
+from ndtheory.keys import Key, Part, key, says
 from ndtheory.moduli import Moduli
 from ndtheory.number import above, below
 from verification.document import Document
-from verification.free_norm.layers import Search
+from verification.free_norm.search import Search
 from verification.semidefinite.interior_point import LMIError
 
 #: By these shares factors are larger, and frictions and thetas smaller, until intervals decide.
-MARGINS = (2e-4, 1e-3, 4e-3, 1.6e-2)
+MARGINS = (2e-4, 1e-3, 3e-3, 8e-3, 1.6e-2)
+
+#: Shares of beta at which a proof is tried: at the largest one the form has a zero.
+INSIDE = (1.0, 0.98)
 
 #: Layers, radii and stiffnesses whose ratios are larger than this are refused.
 RATIO = 10**6
 
-_none = {"null": "where one step is not proved to contract", "default": None}
+#: The keys of what was given.
+INPUTS = {
+    "young": Key(says="E", type="list of number", unit="stress"),
+    "poisson": Key(says="nu", type="list of number"),
+    "depth": Key(says="thickness", type="list of number", unit="length"),
+    "radius": Key(says="r of the hat kernel", type="number", unit="length"),
+    "friction": Key(says="k", type="number"),
+}
+
+_none: dict[str, Any] = {"null": "where one step is not proved to contract", "default": None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +53,7 @@ class FreeNorm(Part):
     """What is proved in a norm that the proof may choose."""
 
     factor: Number | None = key("at theta", **_none)
-    theta_best: float | None = key("the theta of the least factor, to 1e-3", **_none)
+    theta_best: float | None = key("the theta of the least factor, to 0.005", **_none)
     factor_best: Number | None = key("there", **_none)
     theta_max: Number | None = key("every theta below it contracts", **_none)
     friction_threshold: Number = key("every small theta contracts below it")
@@ -54,7 +66,7 @@ class LayersRole(Part):
 
     neumann: int = key("1 or 2: the Neumann body, in the order given")
     theta: float | None = key("the one given; without it the best one in the free norm", **_none)
-    energy: EnergyOfLayers
+    energy: EnergyOfLayers = key("in the norm (5.21)")
     lyapunov: FreeNorm = key("in the free norm")
 
 
@@ -63,12 +75,33 @@ class Layers(Document):
     """Two layers without ends, each clamped at its far side, in contact along any part of a line."""
 
     schema: ClassVar[str] = "ndtheory.layers/1"
+    units: ClassVar[Mapping[str, str]] = {"length": "that of --depth", "stress": "that of --young"}  # type: ignore[misc]
 
     bodies: tuple[Strip, Strip]
     radius: Fraction
     friction: Fraction
+
+    @property
+    @says(inside=INPUTS)
+    def inputs(self) -> dict[str, Any]:
+        """As given, the Neumann body of the first role first."""
+        return {
+            "young": [float(strip.body.young) for strip in self.bodies],
+            "poisson": [float(strip.body.poisson) for strip in self.bodies],
+            "depth": [float(strip.thickness) for strip in self.bodies],
+            "radius": float(self.radius),
+            "friction": float(self.friction),
+        }
+
     roles: tuple[LayersRole, LayersRole] = key("as given, and exchanged")
     proved: bool = key("true if all numbers with ends are proved for every wave number, in intervals")
+
+    @property
+    def both(self) -> tuple[TwoLayers, TwoLayers]:
+        """The layers in both roles."""
+        neumann, contact = self.bodies
+        given = TwoLayers(contact=contact, neumann=neumann, radius=self.radius)
+        return given, given.swapped
 
     @property
     def summary(self) -> str:
@@ -103,11 +136,11 @@ def two_layers(
 
     Examples
     --------
-    >>> found = two_layers(young=(70000, 20000), poisson=("0.3", "0.3"), depth=("0.3", "0.3"), friction="0.2",
-    ...                    radius="0.1", theta="0.7", verified=True)
-    >>> role = found.roles[0]
-    >>> role.lyapunov.factor.level, round(role.lyapunov.factor.value, 3), round(role.energy.factor.value, 2)
-    ('guaranteed', 0.347, 0.49)
+    >>> found = two_layers(
+    ...     young=(70000, 20000), poisson=("0.3", "0.3"), depth=("0.3", "0.3"), friction="6", radius="0.1"
+    ... )
+    >>> [round(role.lyapunov.friction_threshold.value, 1) for role in found.roles]
+    [5.1, 5.0]
     """
     E, nu, d = (_pair(name, pair) for name, pair in (("young", young), ("poisson", poisson), ("depth", depth)))
     bodies = tuple(Moduli(young=e, poisson=n) for e, n in zip(E, nu, strict=True))
@@ -122,12 +155,10 @@ def two_layers(
     chosen = None if theta is None else Fraction(relaxation_factor(theta))
     neumann, contact = (Strip(body=body, thickness=depth) for body, depth in zip(bodies, depths, strict=True))
     given = TwoLayers(contact=contact, neumann=neumann, radius=r)
-    roles = tuple(
+    first, second = (
         _role(number, Search(layers), k, chosen, verified) for number, layers in ((1, given), (2, given.swapped))
     )
-    return Layers(
-        units={}, bodies=(neumann, contact), radius=r, friction=k, roles=(roles[0], roles[1]), proved=verified
-    )
+    return Layers(bodies=(neumann, contact), radius=r, friction=k, roles=(first, second), proved=verified)
 
 
 def _pair(name: str, pair: Any) -> tuple[Any, Any]:
@@ -182,7 +213,7 @@ class _Doubles:
 
 
 class _Proofs(_Doubles):
-    """The same, each moved to the safe side until intervals prove it for every wave number; in doubles where none do."""
+    """The same, moved to the safe side until intervals prove it for every wave number; in doubles where none do."""
 
     def __init__(self, search: Search, k: Fraction) -> None:
         self._search, self._k = search, k
@@ -203,7 +234,10 @@ class _Proofs(_Doubles):
 
     def _holds(self, ends: tuple[Fraction, Fraction], k: Fraction) -> bool:
         found = self._search.allowed((float(ends[0]), float(ends[1])))
-        return found.friction > k and self._search.layers.contracts(ends, _with_friction(found.by, k))
+        if found.friction <= k:
+            return False
+        inside = (replace(found.by, beta=share * found.by.beta) for share in INSIDE)
+        return any(self._search.layers.contracts(ends, _with_friction(by, k)) for by in inside)
 
 
 def _with_friction(by: Multipliers, k: Fraction) -> Multipliers:
