@@ -35,7 +35,7 @@ Symmetric = tuple[Scalar, Scalar, Scalar]
 
 
 def disk(theta: Scalar, q: Scalar) -> tuple[Scalar, Scalar]:
-    """Where the circle of theta and q > 1 - theta meets the real axis.
+    """The two points of the real axis on the circle of theta and q > 1 - theta.
 
     Smaller disks belong to larger q.  Every small theta contracts where the criterion holds on the disk from 0 to 1, to
     which those of q = 1 shrink as theta tends to 0.
@@ -92,7 +92,7 @@ def pencil(
 
     Examples
     --------
-    One component alone: without beta and alpha M is ``A_c + Re(h) A_n``.
+    Without friction M is ``A_c + Re(h) A_n``.
 
     >>> rigid = Multipliers(normal=Fraction(1), alpha=Fraction(0), beta=Fraction(0))
     >>> found = pencil((2, 1, 0), (1, 1, 0), (Fraction(-1), Fraction(2)), rigid, 1)
@@ -184,7 +184,7 @@ class TwoLayers:
         return self._everywhere(holds)
 
     def _everywhere(self, holds: Callable[[Part], bool]) -> bool:
-        """Whether something holds on parts of the wave numbers, halved until it does, that cover all of them."""
+        """True if something holds on parts of the wave numbers, halved until it does, that cover all of them."""
         parts = line(1 / self.contact.thickness, 1 / self.neumann.thickness, 6 / self.radius)
         for _ in range(MOST_PARTS):
             if not parts:
@@ -242,7 +242,7 @@ def energy_form(
 
 
 def _positive(form: list[list[Interval]]) -> bool:
-    """Whether a symmetric matrix is proved to be positive definite, by elimination."""
+    """True if a symmetric matrix is proved to be positive definite, by elimination."""
     rows = [list(row) for row in form]
     for k in reversed(range(len(rows))):  # the forces of step II first
         if rows[k][k].lo <= 0:
@@ -261,7 +261,7 @@ def _inverse(form: tuple[Interval, ...], side: int) -> Symmetric:
 
 
 def _definite(form: Pencil) -> bool:
-    """Whether M is proved to be positive definite on the whole circle."""
+    """True if M is proved to be positive definite on the whole circle."""
     low, high, middle = form.determinants
     if min(form.low[0].lo, form.high[0].lo, low.lo, high.lo) <= 0:
         return False

@@ -36,10 +36,10 @@ def layers(
     target: Path | None,
     as_json: bool,
 ) -> None:
-    """How fast does one step contract between two layers?
+    """Bound the factor of one step between two layers, without a mesh.
 
-    Two layers, each clamped at its far side, touch along any part of a line: there is no mesh.  The factor is that of a
-    norm which the proof chooses, and beside it the one in the norm (5.21) of the paper.  Both roles are shown.  For
+    Two layers, each clamped at its far side, touch along any part of a line.  The proof
+    chooses a norm for the factor; beside it is the one in the norm (5.21) of the paper.  Both roles are shown.  For
     bodies with ends it is a prediction.
 
     \b

@@ -1,4 +1,4 @@
-"""What the circle criterion says of two layers: factors, relaxation factors and friction, by a search for multipliers.
+"""The circle criterion for two layers, evaluated: factors, thetas and friction, by a search for multipliers.
 
 The criterion and its proof in intervals are in :mod:`ndtheory.continuum.circle`.  For given multipliers lambda and beta
 each wave number allows alphas up to one, in closed form, so that the largest friction ``2 sqrt(alpha beta)`` is sought

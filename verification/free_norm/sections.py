@@ -6,7 +6,7 @@ from ndtheory import Number
 from verification import registry
 from verification.free_norm.two_layers import Layers, LayersRole
 from verification.show.numbers import figures, marked
-from verification.show.parts import Cell, Facts, Section, Sections, closing, section, table
+from verification.show.parts import Cell, Facts, Quantity, Section, Sections, closing, section, table
 
 CLAIMS = "anything about bodies with ends, of which this is a prediction, or about the local law"
 
@@ -63,7 +63,9 @@ QUANTITIES = (
 
 def _cell(role: LayersRole, at: object) -> Cell:
     value = at(role)  # type: ignore[operator]
-    return marked(str(_figure(value)), value.level) if isinstance(value, Number) else figures(value)
+    if not isinstance(value, Number):
+        return figures(value)
+    return Quantity(value.value, marked(str(_figure(value)), value.level), level=value.level)
 
 
 def _figure(value: Number) -> Cell:

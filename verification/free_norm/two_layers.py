@@ -50,7 +50,7 @@ class EnergyOfLayers(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class FreeNorm(Part):
-    """What is proved in a norm that the proof may choose."""
+    """The results in a norm that the proof may choose."""
 
     factor: Number | None = key("at theta", **_none)
     theta_best: float | None = key("the theta of the least factor, to 0.005", **_none)
