@@ -21,7 +21,7 @@ from verification.output.files import writing
 @click.option("--depth", required=True, metavar="D_N,D_C", help="Thicknesses, in one unit of length.")
 @click.option("--friction", required=True, metavar="K", help="Coefficient of friction, k > 0.")
 @click.option("--radius", required=True, metavar="R", help="Radius of the hat kernel, in the unit of --depth.")
-@click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta <= 1; without it the best one.")
+@click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1; without it the best one.")
 @click.option("--verified", is_flag=True, help="Prove the numbers in intervals, for every wave number.")
 @one_file(".svg", ".png", words="Figure to draw: the plane of theta and k, by factor")
 @JSON

@@ -126,7 +126,7 @@ def two_layers(
     young, poisson, depth : pairs of numbers
         E, nu and thickness of the Neumann layer and of the contact layer, in plane strain.
     friction, radius, theta : number
-        k > 0, r > 0 in the unit of the depths, 0 < theta <= 1; the best theta by default.
+        k > 0, r > 0 in the unit of the depths, 0 < theta < 1; the best theta by default.
     verified : bool
         True to prove each number in intervals.
 
