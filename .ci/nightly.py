@@ -25,7 +25,7 @@ PARTS = {
     "elements": ("tests/fem1d2d/*", "fem1d2d"),
     "bodies": tuple(f"tests/verification/{name}/*" for name in ("problem", "interface", "contact", "constants")),
     "runs": tuple(f"tests/verification/{name}/*" for name in ("algorithm", "sweeps")),
-    "proofs": tuple(f"tests/verification/{name}/*" for name in ("bounds", "semidefinite", "certificate")),
+    "proofs": tuple(f"tests/verification/{name}/*" for name in ("bounds", "semidefinite", "certificate", "free_norm")),
     "couplings": ("tests/verification/coupling/*",),
     "paper": (
         "tests/verification/paper/*",

@@ -19,7 +19,7 @@ BEGIN, END = "<!-- floors: python tests/test_floors.py -->", "<!-- end of floors
 FLOORS: dict[str, dict[str, str]] = {
     "theory": {
         "ndtheory.symbolic": "__init__ checks dimension engine further mechanics quotient section5 symbols",
-        "ndtheory.continuum": "__init__ calibration intervals rectangles segments strip wedges",
+        "ndtheory.continuum": "__init__ calibration circle intervals rectangles segments strip wedges",
         "ndtheory": "__init__ bounds constants energy_norms errors keys moduli number scalar statements texts",
     },
     "elastic bodies": {
@@ -67,6 +67,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "__init__ calibrating check claims continuum contraction exact_bodies proved_constants sections"
         ),
     },
+    "free norm": {"verification.free_norm": "__init__ search sections two_layers"},
     "runs over grids": {
         "verification.sweeps": ("__init__ best_theta export grid pieces region row sections store sweep workers")
     },
@@ -88,16 +89,16 @@ FLOORS: dict[str, dict[str, str]] = {
     "pages that move": {"verification.exploration": "__init__ film javascript page sections"},
     "figures": {
         "verification.figures": (
-            "__init__ best_theta bodies factor history layers proof_map region reproduction residuals squares "
-            "style sweep waterfall"
+            "__init__ best_theta bodies factor history layer_plane layers proof_map region reproduction residuals "
+            "squares style sweep waterfall"
         )
     },
     "files": {"verification.output": "__init__ fields files folder inputs report"},
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console documents exploring forms ledger main marching options "
-            "problems sweeping"
+            "__init__ advising calculator certifying console documents exploring forms layers ledger main marching "
+            "options problems sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },

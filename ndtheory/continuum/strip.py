@@ -124,6 +124,27 @@ def _sinh_over(x: Interval) -> Interval:
     return Interval(max(values[0].lo, Decimal(1)), max(values[-1].hi, Decimal(1)))
 
 
+def smooth(part: Part, radius: Fraction) -> Interval:
+    """``sinc^4(r xi/2)``, the square of the hat kernel's Fourier transform, enclosed on a part with or without end."""
+    lo, hi = part
+    turn = 6 / radius  # r xi/2 = 3, just before the first zero of sinc at pi
+    if lo >= turn:  # |sinc t| <= 1/t
+        return Interval(Decimal(0), Interval.of(16 / (radius * lo) ** 4).hi)
+    first = sinc(Interval.of(lo * radius / 2))
+    if hi is None or hi > turn:  # |sinc t| <= 1/t <= 1/3 from there on
+        return Interval(Decimal(0), max(first.hi, THIRD)).square().square()
+    last = first if hi == lo else sinc(Interval.of(hi * radius / 2))
+    return Interval(last.lo, first.hi).square().square()
+
+
+def times_smooth(part: Part, radius: Fraction) -> Interval:
+    """xi times :func:`smooth`, enclosed on a part with or without end that begins above 0."""
+    lo, hi = part
+    if hi is None or lo * radius >= 6:  # |sinc t| <= 1/t, and xi/xi^4 falls
+        return Interval(Decimal(0), Interval.of(16 / (radius**4 * lo**3)).hi)
+    return Interval.between(lo, hi) * smooth(part, radius)
+
+
 def largest_smoothed(strip: Strip, radius: Fraction) -> Interval:
     """The supremum over xi of ``S_NN(xi) sinc^4(r xi/2)``, unit stress/length, enclosed.
 
@@ -137,29 +158,19 @@ def largest_smoothed(strip: Strip, radius: Fraction) -> Interval:
     >>> round(found.lo.sqrt(), 1), round(found.hi.sqrt(), 1)
     (Decimal('659.8'), Decimal('659.9'))
     """
-    turn = 6 / radius  # r xi/2 = 3, just before the first zero of sinc at pi
     long = 1 / strip.thickness
 
     def upper(part: Part) -> Decimal:
-        lo, hi = part
-        if hi is None:  # |sinc t| <= 1/t, and xi/xi^4 falls
-            return (strip.over_wave_number(part)[1] * (16 / (radius**4 * lo**3))).hi
-        across = strip.over_wave_number(part)[1] * hi if lo >= long else strip.form(part)[1]
-        if lo >= turn:
-            return (across * (16 / (radius * lo) ** 4)).hi
-        smooth = sinc(Interval.of(lo * radius / 2))
-        if hi > turn:  # |sinc t| <= 1/t <= 1/3 there
-            smooth = Interval(smooth.lo, max(smooth.hi, THIRD))
-        return (across * smooth.square().square()).hi
+        if part[0] >= long:
+            return (strip.over_wave_number(part)[1] * times_smooth(part, radius)).hi
+        return (strip.form(part)[1] * smooth(part, radius)).hi
 
     def value(wave_number: Fraction) -> Decimal:
-        if wave_number > turn:
-            return Decimal(0)
-        smooth = sinc(Interval.of(wave_number * radius / 2)).square().square()
-        return (strip.form((wave_number, wave_number))[1] * smooth).lo
+        part = (wave_number, wave_number)
+        return (strip.form(part)[1] * smooth(part, radius)).lo
 
     least = Decimal(0)
-    heap = [(upper(part).copy_negate(), i, part) for i, part in enumerate(_line(1 / strip.thickness, turn))]
+    heap = [(upper(part).copy_negate(), i, part) for i, part in enumerate(line(1 / strip.thickness, 6 / radius))]
     heapq.heapify(heap)
     for count in range(len(heap), MOST_PARTS):
         negative, _, part = heapq.heappop(heap)
@@ -167,7 +178,7 @@ def largest_smoothed(strip: Strip, radius: Fraction) -> Interval:
         least = max(least, value(_middle(part)))
         if bound <= least * (1 + WIDTH):
             return Interval(least, bound)
-        for i, half in enumerate(_halves(part)):
+        for i, half in enumerate(halves(part)):
             heapq.heappush(heap, (upper(half).copy_negate(), 2 * count + i, half))
     raise Unproved(f"no supremum of S_NN up to {float(WIDTH)} in {MOST_PARTS} parts of the wave numbers")
 
@@ -188,11 +199,11 @@ def largest_ratio_of_strips(contact: Strip, neumann: Strip) -> Fraction:
     0.5144
     """
     pair = (contact, neumann)
-    line = _line(1 / contact.thickness, 1 / neumann.thickness)
-    seen = max(_eigenvalue(*(strip.form(part) for strip in pair)) for part in _points(line))
+    parts = line(1 / contact.thickness, 1 / neumann.thickness)
+    seen = max(_eigenvalue(*(strip.form(part) for strip in pair)) for part in _points(parts))
     for power in range(12, 0, -1):
         ratio = Fraction(seen) * (1 + Fraction(1, 2**power))
-        if _dominates(ratio, contact, neumann, line):
+        if _dominates(ratio, contact, neumann, parts):
             return ratio
     raise Unproved("no bound of S_c by S_n was found")
 
@@ -220,11 +231,11 @@ def _dominates(ratio: Fraction, contact: Strip, neumann: Strip, line: list[Part]
             return False
         if hi is None and lo * min(contact.thickness, neumann.thickness) > 2**12:
             return False
-        parts.extend(_halves(part))
+        parts.extend(halves(part))
     return False
 
 
-def _line(*sizes: Fraction) -> list[Part]:
+def line(*sizes: Fraction) -> list[Part]:
     """All wave numbers in parts, from 0 to far below the smallest of some sizes, then to the double of each."""
     ends = [min(sizes) / 64]
     while ends[-1] < 16 * max(sizes):
@@ -237,7 +248,7 @@ def _middle(part: Part) -> Fraction:
     return 2 * lo if hi is None else (lo + hi) / 2
 
 
-def _halves(part: Part) -> tuple[Part, Part]:
+def halves(part: Part) -> tuple[Part, Part]:
     lo, hi = part
     return (lo, _middle(part)), (_middle(part), hi)
 

@@ -47,6 +47,7 @@ SIDE_BY_SIDE = {
     "contact": {"surface": ["right", "left"]},
 }
 GIVEN = "bounds --m 3084 --M 153229 --CR 1.7"
+LAYERS = "layers --young 7e4,2e4 --poisson 0.3,0.3 --depth 0.3,0.3 --radius 0.1"
 
 
 @cache
@@ -329,6 +330,8 @@ def test_every_document_fits_its_schema_which_has_its_keys_and_no_other(document
         f"{GIVEN} --k 0.1 --Cs 1 --Ctr 1",
         f"{GIVEN} --CK 0 --edition printed",
         "bounds --rho 2",
+        f"{LAYERS} --friction 0.2 --theta 0.7",
+        f"{LAYERS} --friction 6",
         "example",
         "example section6",
         f"example --inputs {folder / 'inputs'}",

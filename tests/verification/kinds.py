@@ -12,6 +12,7 @@ from verification.algorithm.loop import Outcome
 from verification.bounds.bound import Region, Subject
 from verification.bounds.table import Calculated
 from verification.certificate.continuum import certify_continuum
+from verification.free_norm.two_layers import two_layers
 from verification.ledger.evidence import Evidence
 from verification.ledger.rows import Finding
 from verification.registry import BOUNDS
@@ -96,6 +97,9 @@ OTHERS: dict[str, Callable[[vf.Problem], object]] = {
     "Sweep without theta": lambda given: vf.sweep(given, friction=[0.1, 0.4]),
     "Plan": lambda given: plan(given, SweepGrid.of({"theta": ["0.3", "0.5"]})),
     "Calculated": calculated,
+    "Layers": lambda given: two_layers(
+        young=(7, 2), poisson=("0.3", "0.3"), depth=(1, 1), friction=1, radius=1, theta="0.5"
+    ),
     "Ledger": partial(a_ledger, whole=True),
     "Rows of a ledger": partial(a_ledger, whole=False),
     "Reproduction": lambda given: reproduce(("fig5",), jobs=1),

@@ -22,6 +22,7 @@ from verification.cli import (  # noqa: F401  each adds its commands
     certifying,
     documents,
     exploring,
+    layers,
     ledger,
     marching,
     problems,

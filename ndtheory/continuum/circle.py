@@ -1,0 +1,268 @@
+r"""The circle criterion for two layers: a factor of contraction by wave number, in a norm that need not be known.
+
+Two layers touch along any part of a line; the far side of each is clamped.  One step of the iteration is
+``R = (1 - theta) g + theta p``, where p are the forces of step II.  With multipliers that are the same everywhere, the
+conditions of step II are integrated inequalities, and there is a norm in which T_theta contracts by q if (and, for
+these multipliers, only if), for every wave number and every complex h on the circle
+
+    h = theta/(z - (1 - theta)),   |z| = q,
+
+the Hermitian form  ``M(h) = Re p_T* v_T + lambda Re p_N* v_N - alpha |smooth h p_N|^2 - beta |v_T|^2``  of the forces p
+is positive definite, where ``v = (h A_n + A_c) p`` is the jump, A_n and A_c are the flexibilities of both layers,
+lambda, alpha and beta are positive and ``4 alpha beta >= k^2``.  The proof is in ``docs/free_norm.md``.
+
+The circle is symmetric to the real axis, which it meets in :func:`disk`.  All of M but ``i Im h`` times an
+antisymmetric matrix is affine in Re h on the circle, so that M is decided by two real matrices of two rows, those at
+both ends, and by one number: :class:`Pencil`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from ndtheory.continuum.intervals import Interval
+from ndtheory.continuum.strip import MOST_PARTS, Part, Strip, Unproved, halves, line, smooth, times_smooth
+from ndtheory.scalar import Scalar
+
+#: The shortest part of wave numbers into which a proof divides, over its first end.
+SHORTEST = Fraction(1, 2**12)
+
+#: A symmetric matrix of two rows: TT, NN and NT.
+Symmetric = tuple[Scalar, Scalar, Scalar]
+
+
+def disk(theta: Scalar, q: Scalar) -> tuple[Scalar, Scalar]:
+    """The two points of the real axis on the circle of theta and q > 1 - theta.
+
+    Smaller disks belong to larger q.  Every small theta contracts where the criterion holds on the disk from 0 to 1, to
+    which those of q = 1 shrink as theta tends to 0.
+
+    Examples
+    --------
+    >>> disk(Fraction(7, 10), Fraction(1, 2))
+    (Fraction(-7, 8), Fraction(7, 2))
+    """
+    return -theta / (q + 1 - theta), theta / (q - 1 + theta)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Multipliers:
+    """lambda, alpha and beta > 0; ``tau`` is 1.  alpha has the unit length/stress, beta stress/length."""
+
+    normal: Scalar
+    alpha: Scalar
+    beta: Scalar
+
+    @property
+    def enclosed(self) -> Multipliers:
+        """The same as intervals."""
+        return Multipliers(**{name: Interval.of(value) for name, value in vars(self).items()})
+
+
+@dataclass(frozen=True)
+class Pencil:
+    """The form M on a circle: ``(1 - u) low + u high + i turn sqrt(u (1 - u)) J``, 0 <= u <= 1, J' = -J.
+
+    Attributes
+    ----------
+    low, high : Symmetric
+        M at both ends of the disk.
+    turn : Scalar
+        Of any sign.
+    """
+
+    low: Symmetric
+    high: Symmetric
+    turn: Scalar
+
+    @property
+    def determinants(self) -> tuple[Scalar, Scalar, Scalar]:
+        """The determinant of M in Bernstein's form: its values at both ends, and the coefficient of ``2 u (1 - u)``."""
+        (a, b, c), (p, q, r) = self.low, self.high
+        return a * b - c**2, p * q - r**2, (a * q + p * b - self.turn**2) / 2 - c * r
+
+
+def pencil(
+    contact: Symmetric, neumann: Symmetric, ends: tuple[Scalar, Scalar], by: Multipliers, smooth_square: Scalar
+) -> Pencil:
+    """M of two flexibilities at one wave number on the circle with some ends; ``smooth_square`` is ``|smooth|^2``.
+
+    Examples
+    --------
+    Without friction M is ``A_c + Re(h) A_n``.
+
+    >>> rigid = Multipliers(normal=Fraction(1), alpha=Fraction(0), beta=Fraction(0))
+    >>> found = pencil((2, 1, 0), (1, 1, 0), (Fraction(-1), Fraction(2)), rigid, 1)
+    >>> found.low[:2] == (1, 0), found.high[:2] == (4, 3), found.determinants == (0, 12, Fraction(3, 2))
+    (True, True, True)
+    """
+    (c_T, c_N, c_X), (n_T, n_N, n_X) = contact, neumann
+    lam, beta = by.normal, by.beta
+
+    def at(x: Scalar) -> Symmetric:
+        along, across, mixed = c_T + x * n_T, c_N + x * n_N, c_X + x * n_X
+        return (
+            along - beta * along**2,
+            lam * across - beta * mixed**2 - by.alpha * smooth_square * x**2,
+            (1 + lam) * mixed / 2 - beta * along * mixed,
+        )
+
+    low, high = ends
+    turn = (high - low) * ((1 - lam) * n_X / 2 - beta * (c_T * n_X - c_X * n_T))
+    return Pencil(at(low), at(high), turn)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoLayers:
+    """Two layers that touch along any part of a line, with the hat kernel of a radius r > 0.
+
+    Attributes
+    ----------
+    contact, neumann : Strip
+        The layer of step II, and the one of step I.
+    radius : Fraction
+        Unit length.
+    """
+
+    contact: Strip
+    neumann: Strip
+    radius: Fraction
+
+    @property
+    def swapped(self) -> TwoLayers:
+        """The same with the roles exchanged."""
+        return TwoLayers(contact=self.neumann, neumann=self.contact, radius=self.radius)
+
+    def contracts(self, ends: tuple[Fraction, Fraction], by: Multipliers) -> bool:
+        """True if M is proved to be positive definite at every wave number, on the circle with some ends.
+
+        Intervals of wave numbers are halved until M is on each of them; False where a short one leaves it open.
+
+        Raises
+        ------
+        Unproved
+            After MOST_PARTS intervals.
+
+        Examples
+        --------
+        The layers of Section 6 contract by 0.36 at theta = 0.7, with multipliers that allow k = 0.2:
+
+        >>> from ndtheory.moduli import Moduli
+        >>> soft, hard = (Strip(body=Moduli(young=E, poisson="0.3"), thickness=Fraction(3, 10)) for E in (20000, 70000))
+        >>> layers = TwoLayers(contact=soft, neumann=hard, radius=Fraction(1, 10))
+        >>> by = Multipliers(normal=Fraction(11), alpha=Fraction("0.2") ** 2 / (4 * 5900), beta=Fraction(5900))
+        >>> layers.contracts(disk(Fraction(7, 10), Fraction(36, 100)), by)
+        True
+        """
+        multipliers = by.enclosed
+        circle = (Interval.of(ends[0]), Interval.of(ends[1]))
+        return self._everywhere(lambda part: _definite(pencil(*self.enclosed(part, multipliers, circle))))
+
+    def contracts_in_energy(self, theta: Fraction, q: Fraction, by: Multipliers, weight: Fraction) -> bool:
+        """True if T_theta is proved to contract by q in the norm (5.21), by the multipliers times a weight > 0.
+
+        There the norm is the energy of the Neumann layer, ``|g|^2 = g' A_n g``, and the form of g and p
+
+            q^2 |g|^2 - |theta p + (1 - theta) g|^2 + weight M(g, p)
+
+        must be positive definite at every wave number, M being that of ``v = A_n g + A_c p``.
+
+        Raises
+        ------
+        Unproved
+        """
+        multipliers, size = by.enclosed, Interval.of(weight)
+        step = (Interval.of(theta), Interval.of(1 - theta), Interval.of(q).square())
+
+        def holds(part: Part) -> bool:
+            contact, neumann, _, scaled, smooth_square = self.enclosed(part, multipliers, ())
+            return _positive(energy_form(contact, neumann, step, scaled, smooth_square, size))
+
+        return self._everywhere(holds)
+
+    def _everywhere(self, holds: Callable[[Part], bool]) -> bool:
+        """True if something holds on parts of the wave numbers, halved until it does, that cover all of them."""
+        parts = line(1 / self.contact.thickness, 1 / self.neumann.thickness, 6 / self.radius)
+        for _ in range(MOST_PARTS):
+            if not parts:
+                return True
+            part = parts.pop()
+            if holds(part):
+                continue
+            lo, hi = part
+            if lo * self.radius > 2**12 if hi is None else hi - lo <= (lo or hi) * SHORTEST:
+                return False
+            parts.extend(halves(part))
+        raise Unproved(f"{MOST_PARTS} parts of the wave numbers leave the circle criterion open")
+
+    def enclosed(
+        self, part: Part, by: Multipliers, ends: Any
+    ) -> tuple[Symmetric, Symmetric, Any, Multipliers, Interval]:
+        """The arguments of :func:`pencil` enclosed on a part; times xi where both layers are thick beside the waves."""
+        bodies = (self.contact, self.neumann)
+        long = part[0] * min(body.thickness for body in bodies) >= 1
+        contact, neumann = (body.over_wave_number(part) if long else body.form(part) for body in bodies)
+        flexible = (_inverse(contact, -1), _inverse(neumann, 1))
+        if not long:
+            return *flexible, ends, by, smooth(part, self.radius)
+        fading = Interval.between(0 if part[1] is None else 1 / part[1], 1 / part[0])
+        faded = Multipliers(normal=by.normal, alpha=by.alpha, beta=by.beta * fading)
+        return *flexible, ends, faded, times_smooth(part, self.radius)
+
+
+def energy_form(
+    contact: Symmetric,
+    neumann: Symmetric,
+    step: tuple[Scalar, Scalar, Scalar],
+    by: Multipliers,
+    smooth_square: Scalar,
+    weight: Scalar,
+) -> list[list[Scalar]]:
+    """The form of :meth:`TwoLayers.contracts_in_energy`, of (g_T, g_N, p_T, p_N); ``step`` is theta, 1 - theta, q^2."""
+    theta, rest, square = step
+    n, c = (((t, x), (x, a)) for t, a, x in (neumann, contact))
+    jump = [[*n[i], *c[i]] for i in (0, 1)]  # v_T and v_N
+    shares = (rest, rest, theta, theta)
+    form = [[-(shares[i] * shares[j] * n[i % 2][j % 2]) for j in range(4)] for i in range(4)]
+    for i in range(4):
+        for j in range(4):
+            if i < 2 and j < 2:
+                form[i][j] += square * n[i][j]
+            taken = by.beta * jump[0][i] * jump[0][j]
+            for component, factor in ((0, 1), (1, by.normal)):
+                for at, other in ((i, j), (j, i)):
+                    if at == 2 + component:
+                        form[i][j] += weight * factor * jump[component][other] / 2
+            form[i][j] -= weight * taken
+    form[1][1] -= weight * by.alpha * smooth_square
+    return form
+
+
+def _positive(form: list[list[Interval]]) -> bool:
+    """True if a symmetric matrix is proved to be positive definite, by elimination."""
+    rows = [list(row) for row in form]
+    for k in reversed(range(len(rows))):  # the forces of step II first
+        if rows[k][k].lo <= 0:
+            return False
+        for i in range(k):
+            for j in range(i + 1):
+                rows[i][j] = rows[i][j] - rows[k][i] * rows[k][j] / rows[k][k]
+    return True
+
+
+def _inverse(form: tuple[Interval, ...], side: int) -> Symmetric:
+    """The flexibility of a layer on a side, -1 or 1, of the surface."""
+    along, across, mixed = form
+    determinant = along * across - mixed.square()
+    return across / determinant, along / determinant, mixed * -side / determinant
+
+
+def _definite(form: Pencil) -> bool:
+    """True if M is proved to be positive definite on the whole circle."""
+    low, high, middle = form.determinants
+    if min(form.low[0].lo, form.high[0].lo, low.lo, high.lo) <= 0:
+        return False
+    return bool(middle.lo > 0 or (Interval.of(middle.lo).square() - Interval.of(low.lo) * high.lo).hi < 0)

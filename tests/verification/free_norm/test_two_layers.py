@@ -1,0 +1,136 @@
+"""Two layers without ends: the search for multipliers, and what the command says of them."""
+
+import json
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import fewer
+
+from ndtheory import HypothesisError
+from ndtheory.continuum.circle import Multipliers, TwoLayers, disk, pencil
+from ndtheory.continuum.strip import Strip
+from ndtheory.moduli import Moduli
+from verification.free_norm.search import Search, least_ratio
+from verification.free_norm.two_layers import two_layers
+
+SECTION_6 = {"young": (70000, 20000), "poisson": ("0.3", "0.3"), "depth": ("0.3", "0.3"), "radius": "0.1"}
+
+
+def search(young=(70000, 20000), depth=("0.3", "0.3"), radius="0.1"):
+    neumann, contact = (
+        Strip(body=Moduli(young=E, poisson="0.3"), thickness=Fraction(d)) for E, d in zip(young, depth, strict=True)
+    )
+    return Search(TwoLayers(contact=contact, neumann=neumann, radius=Fraction(radius)))
+
+
+# By cvxpy with a norm Q(xi) of each wave number as unknowns: factors in (5.21) and in the free norm.  There were 26 to
+# 70 wave numbers; more make the factors in (5.21) up to 1 % larger.
+@pytest.mark.parametrize(
+    ("k", "theta", "energy", "free"),
+    [(0.2, 0.7, 0.491, 0.349), (0.2, 0.8, 0.442, 0.302), (0.9, 0.6, 1.298, 0.530), (1.6, 0.4, 1.615, 0.723)],
+)
+def test_factors_are_those_of_programs_with_a_norm_for_each_wave_number(k, theta, energy, free):
+    layers = search()
+    assert layers.factor(theta, k) == pytest.approx(free, rel=6e-3)
+    assert layers.energy_factor(theta, k)[0] == pytest.approx(energy, rel=1e-2)
+
+
+def test_roles_exchanged_need_a_small_theta():
+    exchanged = search(young=(20000, 70000))
+    assert exchanged.factor(0.1, 0.2) == pytest.approx(0.913, rel=3e-3)
+    assert exchanged.factor(0.7, 0.2) is None
+    assert exchanged.energy_factor(0.1, 0.9)[0] == pytest.approx(1.005, rel=3e-3)
+
+
+@fewer(3)
+@given(st.floats(0.2, 5), st.floats(0.2, 5), st.floats(0.1, 0.9), st.floats(0.05, 2), st.sampled_from(["0.05", "0.3"]))
+def test_less_friction_smaller_steps_and_the_threshold_are_in_order(ratio, depth, theta, k, radius):
+    layers = search(young=(Fraction(ratio), 1), depth=(Fraction(depth), 1), radius=radius)
+    q = layers.factor(theta, k)
+    threshold = layers.friction_threshold
+    if q is None:
+        largest = layers.largest_theta(k)
+        assert largest is None or largest <= theta + 1e-4
+        assert (largest is None) == (k > threshold)
+        return
+    assert k <= threshold * (1 + 2e-3)
+    assert 1 - theta <= q <= 1
+    assert (layers.factor(theta, k / 2) or 1) <= q + 2e-3
+    half = layers.factor(theta / 2, k)  # the mean of T and the identity contracts in the same norm
+    assert half is not None
+    assert half <= (1 + q) / 2 + 2e-3
+
+
+def test_multipliers_of_the_search_make_the_form_definite_and_a_little_more_friction_does_not():
+    layers, ends = search(), disk(0.7, 0.36)
+    best = layers.allowed(ends)
+    for share, definite in ((0.999, True), (1.001, False)):
+        by = Multipliers(normal=best.by.normal, alpha=share * best.by.alpha, beta=best.by.beta)
+        form = pencil(layers.contact, layers.neumann, ends, by, layers.smooth)
+        low, high, middle = form.determinants
+        u = np.linspace(0, 1, 2001)[:, None]
+        found = low * (1 - u) ** 2 + 2 * middle * u * (1 - u) + high * u**2
+        assert (found.min() > 0) == definite
+    rng = np.random.default_rng(1)
+    for _ in range(200):  # no others allow more
+        lam, beta = best.by.normal * np.exp(rng.normal(0, 1)), best.by.beta * np.exp(rng.normal(0, 1))
+        alpha = layers.largest_alpha(ends, np.array([[lam]]), np.array([[beta]]))[0, 0]
+        assert 2 * np.sqrt(max(alpha * beta, 0)) <= best.friction * (1 + 1e-5)
+
+
+def test_the_least_ratio_of_quadratics_is_that_on_a_fine_grid():
+    rng = np.random.default_rng(2)
+    over, under = rng.normal(size=(3, 300)), rng.uniform(0.1, 2, size=(3, 300))
+    u = np.linspace(0, 1, 20001)[:, None]
+    value = lambda f: f[0] * (1 - u) ** 2 + 2 * f[2] * u * (1 - u) + f[1] * u**2
+    assert least_ratio(tuple(over), tuple(under)) == pytest.approx((value(over) / value(under)).min(axis=0), abs=1e-6)
+
+
+def test_what_is_proved_is_on_the_safe_side_and_near():
+    proved, found = (two_layers(**SECTION_6, friction="0.2", theta="0.7", verified=v) for v in (True, False))
+    for one, other in zip(proved.roles, found.roles, strict=True):
+        numbers = lambda role: (role.energy.factor, *vars(role.lyapunov).values())
+        for sure, seen in zip(numbers(one), numbers(other), strict=True):
+            if sure is None or isinstance(sure, float):
+                assert sure == seen
+                continue
+            assert (sure.level, seen.level) == ("guaranteed", "float")
+            assert sure.value == pytest.approx(seen.value, rel=2e-2)
+            assert sure.hi is None or sure.hi >= seen.value
+            assert sure.lo is None or sure.lo <= seen.value
+    assert proved.roles[0].lyapunov.factor.hi == pytest.approx(0.3474, abs=1e-3)
+
+
+def test_units_of_length_and_stress_do_not_matter():
+    one, other = search(), search(young=(70, 20), depth=("300", "300"), radius="100")
+    assert one.factor(0.7, 0.2) == pytest.approx(other.factor(0.7, 0.2), abs=1e-4)
+    assert one.energy_factor(0.7, 0.2)[0] == pytest.approx(other.energy_factor(0.7, 0.2)[0], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"young": ("7e4",)}, "two numbers"),
+        ({"poisson": ("0.3", "0.5")}, "nu < 1/2"),
+        ({"depth": ("0.3", "0")}, "thickness > 0"),
+        ({"friction": "0"}, "k > 0"),
+        ({"radius": "-1"}, "radius > 0"),
+        ({"theta": "1.5"}, "theta"),
+        ({"young": (1, 10**9)}, "ratios"),
+    ],
+)
+def test_bad_values_are_refused_with_what_is_needed(changed, words):
+    with pytest.raises(HypothesisError, match=words):
+        two_layers(**{**SECTION_6, "friction": "0.2", **changed})
+
+
+def test_beyond_the_threshold_nothing_is_said_to_contract():
+    found = two_layers(**SECTION_6, friction="6")
+    for role in found.to_dict()["roles"]:
+        assert role["theta"] is None
+        assert role["lyapunov"]["factor"] is role["energy"]["factor"] is None
+        assert role["lyapunov"]["friction_threshold"]["value"] < 6
+        assert json.dumps(role)

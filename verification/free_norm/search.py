@@ -1,0 +1,220 @@
+"""The circle criterion for two layers, evaluated: factors, thetas and friction, by a search for multipliers.
+
+The criterion and its proof in intervals are in :mod:`ndtheory.continuum.circle`.  For given multipliers lambda and beta
+each wave number allows alphas up to one, in closed form, so that the largest friction ``2 sqrt(alpha beta)`` is sought
+in a plane.  The set of multipliers is convex and the square root concave, so a grid that is drawn in on its best point
+finds the largest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.optimize import brentq, minimize_scalar
+
+from fem1d2d.mesh import Floats
+from ndtheory.continuum.circle import Multipliers, Symmetric, TwoLayers, disk, pencil
+from ndtheory.continuum.strip import Strip, symbols
+from verification.semidefinite.interior_point import Program, solve
+
+#: Wave numbers of a search between two, by thickness and radius; and two at which nothing changes any more.
+WAVES, BETWEEN, ENDS = 120, (0.03, 60.0), (1e-3, 1e3)
+
+#: Points of the grid of lambda and beta, the first half widths of it in logarithms, and what is left of them each time.
+GRID, WIDTHS, DRAWN_IN = (11, 9), (7.0, 3.0), 0.45
+
+#: How often the grid is drawn in: 7 * 0.45^11 leaves 1e-3 of lambda, where the friction is flat.
+TIMES = 11
+
+#: How well factors and relaxation factors are known.
+NEAR = 1e-5
+
+#: The program in the norm (5.21) has each so many of the wave numbers.
+FEWER = 3
+
+#: The square of the smoothing is at least this, where no alpha would be too large.
+LEAST = 1e-30
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """The largest friction that the criterion allows on a circle; negative where it holds for none."""
+
+    friction: float
+    by: Multipliers
+
+
+class Search:
+    """The search for multipliers of two layers.
+
+    Examples
+    --------
+    >>> from fractions import Fraction
+    >>> from ndtheory.moduli import Moduli
+    >>> soft, hard = (Strip(body=Moduli(young=E, poisson="0.3"), thickness=Fraction(3, 10)) for E in (20000, 70000))
+    >>> layers = Search(TwoLayers(contact=soft, neumann=hard, radius=Fraction(1, 10)))
+    >>> round(layers.factor(0.7, 0.2), 4), round(layers.friction_threshold, 1)
+    (0.3473, 5.1)
+    """
+
+    def __init__(self, layers: TwoLayers) -> None:
+        self.layers = layers
+        depths = [float(strip.thickness) for strip in (layers.contact, layers.neumann)]
+        radius = float(layers.radius)
+        long, short = 1 / max(depths), 1 / min(*depths, radius)
+        inner = np.geomspace(BETWEEN[0] * long, BETWEEN[1] * short, WAVES)
+        xi = np.array([ENDS[0] * long, *inner, ENDS[1] * short])
+        self.contact = flexibility(layers.contact, xi, side=-1)
+        self.neumann = flexibility(layers.neumann, xi, side=1)
+        self.smooth = np.maximum(np.sinc(radius * xi / (2 * np.pi)) ** 4, LEAST)
+
+    def allowed(self, ends: tuple[float, float]) -> Allowed:
+        """The largest friction allowed on the circle with some ends."""
+        along = max(float((self.contact[0] + x * self.neumann[0]).max()) for x in ends)
+        none = Allowed(-1.0, Multipliers(normal=1.0, alpha=0.0, beta=0.0))
+        if min(float((self.contact[0] + x * self.neumann[0]).min()) for x in ends) <= 0:
+            return none
+        centre, widths = np.array([0.0, -1.5]), np.array(WIDTHS)
+        for _ in range(TIMES):
+            axes = [np.linspace(c - w, c + w, n) for c, w, n in zip(centre, widths, GRID, strict=True)]
+            normal, beta = np.exp(axes[0])[:, None], np.exp(np.minimum(axes[1], 0))[None, :] / along
+            alpha = self.largest_alpha(ends, normal, beta)
+            value = 4 * alpha * beta
+            best = value if value.max() > 0 else alpha  # nothing is allowed yet: where the least is missing
+            i, j = np.unravel_index(int(best.argmax()), best.shape)
+            centre = np.array([axes[0][i], min(axes[1][j], 0.0)])
+            widths = widths * DRAWN_IN
+        if value[i, j] <= 0:
+            return none
+        by = Multipliers(normal=float(normal[i, 0]), alpha=float(alpha[i, j]), beta=float(beta[0, j]))
+        return Allowed(float(np.sqrt(value[i, j])), by)
+
+    def largest_alpha(self, ends: tuple[float, float], normal: Floats, beta: Floats) -> Floats:
+        """The largest alpha for which M is positive semidefinite at all wave numbers; -inf without one."""
+        by = Multipliers(normal=normal[..., None], alpha=0.0, beta=beta[..., None])
+        form = pencil(self.contact, self.neumann, ends, by, 0.0)
+        low, high = form.low[0], form.high[0]
+        # the determinant falls by alpha times these, in Bernstein's form too
+        x, y = ends
+        taken = (self.smooth * x**2 * low, self.smooth * y**2 * high, self.smooth * (y**2 * low + x**2 * high) / 2)
+        found = np.where((low > 0) & (high > 0), least_ratio(form.determinants, taken), -np.inf)
+        return np.asarray(found.min(axis=-1))
+
+    def factor(self, theta: float, k: float) -> float | None:
+        """The least q for which T_theta contracts by q at friction k, 0 < theta <= 1; None where there is none."""
+        missing = lambda q: self.allowed(disk(theta, q)).friction - k
+        return _least(missing, 1 - theta + NEAR, 1.0)
+
+    def largest_theta(self, k: float) -> float | None:
+        """The theta <= 1 below which every T_theta contracts at friction k; None where no theta does."""
+        missing = lambda share: self.allowed(disk(1 - share, 1.0)).friction - k
+        share = _least(missing, 0.0, 1 - NEAR)
+        return None if share is None else 1 - share
+
+    def best_theta(self, k: float) -> tuple[float, float] | None:
+        """The theta with the least factor at friction k, to 0.005, and that factor; None where no theta contracts."""
+        largest = self.largest_theta(k)
+        if largest is None:
+            return None
+        factor = lambda theta: self.factor(theta, k) or 1.0
+        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": 5e-3})
+        return float(found.x), float(found.fun)
+
+    def energy_factor(self, theta: float, k: float) -> tuple[float, Multipliers, float]:
+        """The least factor in the norm (5.21) by multipliers that all wave numbers share; these, and their weight.
+
+        Raises
+        ------
+        LMIError
+        """
+        found = solve(self._energy_program(theta, k))
+        normal, tangential, alpha, beta = found.y
+        by = Multipliers(normal=normal / tangential, alpha=k * alpha / tangential, beta=k * beta / tangential)
+        return float(np.sqrt(found.s)), by, float(tangential)
+
+    def _energy_program(self, theta: float, k: float) -> Program:
+        """The program of the least square of the factor, one block of four rows for each wave number.
+
+        The coordinates are those in which the energies of g and p are squares of lengths.
+        """
+        few = slice(None, None, FEWER)
+        roots = [np.linalg.cholesky(_matrices(form)[few]) for form in (self.neumann, self.contact)]
+        L, C = (np.linalg.inv(root.transpose(0, 2, 1)) for root in roots)  # g = L y, p = C z
+        waves, zero = len(L), np.zeros_like(L)
+        force, taken = np.concatenate([zero, C], axis=2), np.concatenate([L, zero], axis=2)
+        jump = -np.concatenate([roots[0], roots[1]], axis=2)
+        back = L.transpose(0, 2, 1) @ _matrices(self.neumann)[few]
+        move = theta * back @ force + (1 - theta) * np.concatenate([np.broadcast_to(np.eye(2), L.shape), zero], axis=2)
+        size = np.sqrt(k)
+        zeta, slide = size * np.sqrt(self.smooth[few])[:, None] * taken[:, 1], size * jump[:, 0]
+        pairs = ((force[:, 1], jump[:, 1]), (force[:, 0], jump[:, 0]), (zeta, zeta), (slide, slide))
+        spread = lambda rows: block_diag(*rows[:, None])
+        left, right = (np.vstack([spread(pair[i]) for pair in pairs]) for i in (0, 1))
+        rho = 1 / min(
+            np.linalg.eigvals(np.linalg.solve(_matrices(self.neumann), _matrices(self.contact))).real.min(), 1
+        )
+        b = 0.1 / (k * float(self.contact[0].max()))
+        tau = 4 * theta**2 * (1 + rho)
+        return Program(
+            fixed=block_diag(*(-move.transpose(0, 2, 1) @ move)),
+            free=block_diag(*[np.diag([1.0, 1.0, 0.0, 0.0])] * waves),
+            left=left,
+            right=right,
+            tie=np.repeat(np.eye(4), waves, axis=0),
+            cones=np.array([[1, 2, 3]]),
+            most=np.full(4, np.inf),
+            s=1e4,
+            y=np.array([tau, tau, tau / b, tau * b]),
+            blocks=tuple(slice(4 * i, 4 * i + 4) for i in range(waves)),
+        )
+
+    @property
+    def friction_threshold(self) -> float:
+        """The friction below which every small theta contracts, and above which none does by this criterion."""
+        return self.allowed((0.0, 1.0)).friction
+
+
+def flexibility(strip: Strip, xi: Floats, *, side: int) -> Symmetric:
+    """TT, NN and NT of ``S^-1`` of a layer on a side, -1 or 1, of the surface, for wave numbers > 0."""
+    x = xi * float(strip.thickness)
+    fading = np.exp(-2 * x)
+    kappa, scale = float(strip.body.kappa), float(strip.body.shear) * xi
+    form = symbols(kappa, (1 - fading**2) / 2, (np.expm1(-2 * x) / 2) ** 2, x * fading, x**2 * fading)
+    along, across, mixed = (scale * entry for entry in form)
+    determinant = along * across - mixed**2
+    return across / determinant, along / determinant, -side * mixed / determinant
+
+
+def _matrices(form: Symmetric) -> Floats:
+    """Symmetric matrices of two rows, one for each wave number."""
+    along, across, mixed = form
+    return np.array([[along, mixed], [mixed, across]]).transpose(2, 0, 1)
+
+
+def least_ratio(over: tuple[Any, Any, Any], under: tuple[Any, Any, Any]) -> Floats:
+    """The least ratio of two quadratic polynomials in Bernstein's form (ends, middle) on [0, 1], the second one > 0."""
+    (f, g, m), (p, q, r) = over, under
+    a, b, c = g * r - m * q, g * p - f * q, m * p - f * r  # of its derivative, in t = u/(1 - u)
+    with np.errstate(all="ignore"):
+        half = -(b + np.copysign(np.sqrt(np.maximum(b**2 - 4 * a * c, 0)), b)) / 2
+        best = np.minimum(np.where(p > 0, f / p, np.where(f < 0, -np.inf, np.inf)), g / q)
+        for t in (half / a, c / half):
+            value = (f + 2 * m * t + g * t**2) / (p + 2 * r * t + q * t**2)
+            best = np.where((t > 0) & np.isfinite(value), np.minimum(best, value), best)
+    return np.asarray(best)
+
+
+def _least(missing: Callable[[float], float], low: float, high: float) -> float | None:
+    """The least value from which on something that grows is >= 0, on the safe side; None where it is nowhere."""
+    if missing(high) < 0:
+        return None
+    if missing(low) >= 0:
+        return low
+    found = brentq(missing, low, high, xtol=NEAR)
+    while missing(found) < 0:
+        found = min(found + NEAR, high)
+    return float(found)

@@ -1,0 +1,259 @@
+"""The answer for two layers: both roles beside each other, in doubles or proved for all wave numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, ClassVar
+
+from ndtheory import HypothesisError, Number
+from ndtheory.constants import relaxation_factor, take
+from ndtheory.continuum.circle import Multipliers, TwoLayers, disk
+from ndtheory.continuum.strip import Strip, Unproved
+from ndtheory.keys import Key, Part, key, says
+from ndtheory.moduli import Moduli
+from ndtheory.number import above, below
+from verification.document import Document
+from verification.free_norm.search import Search
+from verification.semidefinite.interior_point import LMIError
+
+#: By these shares factors are larger, and frictions and thetas smaller, until intervals decide.
+MARGINS = (2e-4, 1e-3, 3e-3, 8e-3, 1.6e-2)
+
+#: Shares of beta at which a proof is tried: at the largest one the form has a zero.
+INSIDE = (1.0, 0.98)
+
+#: Layers, radii and stiffnesses whose ratios are larger than this are refused.
+RATIO = 10**6
+
+#: The keys of what was given.
+INPUTS = {
+    "young": Key(says="E", type="list of number", unit="stress"),
+    "poisson": Key(says="nu", type="list of number"),
+    "depth": Key(says="thickness", type="list of number", unit="length"),
+    "radius": Key(says="r of the hat kernel", type="number", unit="length"),
+    "friction": Key(says="k", type="number"),
+}
+
+_none: dict[str, Any] = {"null": "where one step is not proved to contract", "default": None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyOfLayers(Part):
+    """The factor in the norm (5.21)."""
+
+    factor: Number | None = key(
+        "at theta, by multipliers that all wave numbers share; above 1 nothing contracts", **_none
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeNorm(Part):
+    """The results in a norm that the proof may choose."""
+
+    factor: Number | None = key("at theta", **_none)
+    theta_best: float | None = key("the theta of the least factor, to 0.005", **_none)
+    factor_best: Number | None = key("there", **_none)
+    theta_max: Number | None = key("every theta below it contracts", **_none)
+    friction_threshold: Number = key("every small theta contracts below it")
+    friction_limit: Number = key("some theta contracts below it: the same, as smaller thetas then contract as well")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayersRole(Part):
+    """Two layers in one of both roles."""
+
+    neumann: int = key("1 or 2: the Neumann body, in the order given")
+    theta: float | None = key("the one given; without it the best one in the free norm", **_none)
+    energy: EnergyOfLayers = key("in the norm (5.21)")
+    lyapunov: FreeNorm = key("in the free norm")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layers(Document):
+    """Two layers without ends, each clamped at its far side, in contact along any part of a line."""
+
+    schema: ClassVar[str] = "ndtheory.layers/1"
+    units: ClassVar[Mapping[str, str]] = {"length": "that of --depth", "stress": "that of --young"}  # type: ignore[misc]
+
+    bodies: tuple[Strip, Strip]
+    radius: Fraction
+    friction: Fraction
+
+    @property
+    @says(inside=INPUTS)
+    def inputs(self) -> dict[str, Any]:
+        """As given, the Neumann body of the first role first."""
+        return {
+            "young": [float(strip.body.young) for strip in self.bodies],
+            "poisson": [float(strip.body.poisson) for strip in self.bodies],
+            "depth": [float(strip.thickness) for strip in self.bodies],
+            "radius": float(self.radius),
+            "friction": float(self.friction),
+        }
+
+    roles: tuple[LayersRole, LayersRole] = key("as given, and exchanged")
+    proved: bool = key("true if all numbers with ends are proved for every wave number, in intervals")
+
+    @property
+    def both(self) -> tuple[TwoLayers, TwoLayers]:
+        """The layers in both roles."""
+        neumann, contact = self.bodies
+        given = TwoLayers(contact=contact, neumann=neumann, radius=self.radius)
+        return given, given.swapped
+
+    @property
+    def summary(self) -> str:
+        free = self.roles[0].lyapunov.factor
+        return f"two layers: {'no contraction' if free is None else f'factor {free.value:.4g} in the free norm'}"
+
+
+def two_layers(
+    *,
+    young: Sequence[Any],
+    poisson: Sequence[Any],
+    depth: Sequence[Any],
+    friction: Any,
+    radius: Any,
+    theta: Any = None,
+    verified: bool = False,
+) -> Layers:
+    """The circle criterion for two layers, the Neumann body first, in both roles.
+
+    Parameters
+    ----------
+    young, poisson, depth : pairs of numbers
+        E, nu and thickness of the Neumann layer and of the contact layer, in plane strain.
+    friction, radius, theta : number
+        k > 0, r > 0 in the unit of the depths, 0 < theta < 1; the best theta by default.
+    verified : bool
+        True to prove each number in intervals.
+
+    Raises
+    ------
+    HypothesisError
+
+    Examples
+    --------
+    >>> found = two_layers(
+    ...     young=(70000, 20000), poisson=("0.3", "0.3"), depth=("0.3", "0.3"), friction="6", radius="0.1"
+    ... )
+    >>> [round(role.lyapunov.friction_threshold.value, 1) for role in found.roles]
+    [5.1, 5.0]
+    """
+    E, nu, d = (_pair(name, pair) for name, pair in (("young", young), ("poisson", poisson), ("depth", depth)))
+    bodies = tuple(Moduli(young=e, poisson=n) for e, n in zip(E, nu, strict=True))
+    if not all(body.kappa > 1 for body in bodies):
+        raise HypothesisError("poisson", ", ".join(map(str, nu)), "compressible layers, nu < 1/2")
+    depths = [take("depth", value, "a thickness > 0", lambda v: v > 0) for value in d]
+    r = take("radius", radius, "a radius > 0", lambda v: v > 0)
+    k = take("friction", friction, "a coefficient k > 0: without friction (5.21) is the best norm", lambda v: v > 0)
+    for name, values in (("young", [body.shear for body in bodies]), ("depth, radius", [*depths, r])):
+        if max(values) > RATIO * min(values):
+            raise HypothesisError(name, ", ".join(str(float(value)) for value in values), f"ratios up to {RATIO:g}")
+    chosen = None if theta is None else Fraction(relaxation_factor(theta))
+    neumann, contact = (Strip(body=body, thickness=depth) for body, depth in zip(bodies, depths, strict=True))
+    given = TwoLayers(contact=contact, neumann=neumann, radius=r)
+    first, second = (
+        _role(number, Search(layers), k, chosen, verified) for number, layers in ((1, given), (2, given.swapped))
+    )
+    return Layers(bodies=(neumann, contact), radius=r, friction=k, roles=(first, second), proved=verified)
+
+
+def _pair(name: str, pair: Any) -> tuple[Any, Any]:
+    if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
+        raise HypothesisError(name, pair, "two numbers, of the Neumann layer and of the contact layer")
+    return pair[0], pair[1]
+
+
+def _role(number: int, search: Search, k: Fraction, theta: Fraction | None, verified: bool) -> LayersRole:
+    friction = float(k)
+    proofs = _Proofs(search, k) if verified else _Doubles()
+    best = search.best_theta(friction)
+    if theta is None and best is not None:
+        theta = Fraction(best[0]).limit_denominator(10**4)
+    factor, energy = None if theta is None else search.factor(float(theta), friction), None
+    if theta is not None:
+        try:
+            energy = proofs.energy(theta, *search.energy_factor(float(theta), friction))
+        except LMIError:  # no multipliers at all
+            energy = None
+    largest, threshold = search.largest_theta(friction), proofs.threshold(search.friction_threshold)
+    free = FreeNorm(
+        factor=None if theta is None or factor is None else proofs.factor(theta, factor),
+        theta_best=None if best is None else best[0],
+        factor_best=None if best is None else proofs.factor(Fraction(best[0]), best[1]),
+        theta_max=None if largest is None else proofs.largest_theta(largest),
+        friction_threshold=threshold,
+        friction_limit=threshold,
+    )
+    return LayersRole(
+        neumann=number,
+        theta=None if theta is None else float(theta),
+        energy=EnergyOfLayers(factor=energy),
+        lyapunov=free,
+    )
+
+
+class _Doubles:
+    """Numbers as the search finds them, in doubles at a few hundred wave numbers."""
+
+    def factor(self, theta: Fraction, q: float) -> Number:
+        return Number.of_float(q)
+
+    def largest_theta(self, theta: float) -> Number:
+        return Number.of_float(theta)
+
+    def threshold(self, k: float) -> Number:
+        return Number.of_float(k)
+
+    def energy(self, theta: Fraction, q: float, by: Multipliers, weight: float) -> Number:
+        return Number.of_float(q)
+
+
+class _Proofs(_Doubles):
+    """The same, moved to the safe side until intervals prove it for every wave number; in doubles where none do."""
+
+    def __init__(self, search: Search, k: Fraction) -> None:
+        self._search, self._k = search, k
+
+    def factor(self, theta: Fraction, q: float) -> Number:
+        return _proved(q, 1, lambda value: self._holds(disk(theta, value), self._k))
+
+    def largest_theta(self, theta: float) -> Number:
+        return _proved(theta, -1, lambda value: self._holds(disk(value, Fraction(1)), self._k))
+
+    def threshold(self, k: float) -> Number:
+        return _proved(k, -1, lambda value: self._holds((Fraction(0), Fraction(1)), value))
+
+    def energy(self, theta: Fraction, q: float, by: Multipliers, weight: float) -> Number:
+        exact = _with_friction(by, self._k)
+        holds = self._search.layers.contracts_in_energy
+        return _proved(q, 1, lambda value: holds(theta, value, exact, Fraction(weight)))
+
+    def _holds(self, ends: tuple[Fraction, Fraction], k: Fraction) -> bool:
+        found = self._search.allowed((float(ends[0]), float(ends[1])))
+        if found.friction <= k:
+            return False
+        inside = (replace(found.by, beta=share * found.by.beta) for share in INSIDE)
+        return any(self._search.layers.contracts(ends, _with_friction(by, k)) for by in inside)
+
+
+def _with_friction(by: Multipliers, k: Fraction) -> Multipliers:
+    """Rational multipliers near some in doubles, with ``4 alpha beta = k^2``."""
+    beta = Fraction(by.beta)
+    return Multipliers(normal=Fraction(by.normal), alpha=k**2 / (4 * beta), beta=beta)
+
+
+def _proved(value: float, side: int, holds: Callable[[Fraction], bool]) -> Number:
+    """The nearest of some numbers beside one, above it (side 1) or below it (-1), for which something is proved."""
+    for margin in MARGINS:
+        moved = Fraction(value * (1 + side * margin))
+        try:
+            if holds(moved):
+                end = above(moved) if side > 0 else below(moved)
+                return Number(value=end, **{"hi" if side > 0 else "lo": end}, level="guaranteed")
+        except Unproved:
+            continue
+    return Number.of_float(value)
