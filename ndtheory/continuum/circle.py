@@ -3,13 +3,13 @@ r"""The circle criterion for two layers: a factor of contraction by wave number,
 Two layers touch along any part of a line; the far side of each is clamped.  One step of the iteration is
 ``R = (1 - theta) g + theta p``, where p are the forces of step II.  With multipliers that are the same everywhere, the
 conditions of step II are integrated inequalities, and there is a norm in which T_theta contracts by q if (and, for
-these multipliers, only if), for every wave number and every complex h on the circle
+these multipliers, only if), for every wave number and every complex h on the circle::
 
     h = theta/(z - (1 - theta)),   |z| = q,
 
 the Hermitian form  ``M(h) = Re p_T* v_T + lambda Re p_N* v_N - alpha |smooth h p_N|^2 - beta |v_T|^2``  of the forces p
 is positive definite, where ``v = (h A_n + A_c) p`` is the jump, A_n and A_c are the flexibilities of both layers,
-lambda, alpha and beta are positive and ``4 alpha beta >= k^2``.  The proof is in ``docs/free_norm.md``.
+lambda, alpha and beta are positive and ``4 alpha beta >= k^2``.  The proof is in ``docs/layers.md``.
 
 The circle is symmetric to the real axis, which it meets in :func:`disk`.  All of M but ``i Im h`` times an
 antisymmetric matrix is affine in Re h on the circle, so that M is decided by two real matrices of two rows, those at
@@ -164,7 +164,7 @@ class TwoLayers:
     def contracts_in_energy(self, theta: Fraction, q: Fraction, by: Multipliers, weight: Fraction) -> bool:
         """True if T_theta is proved to contract by q in the norm (5.21), by the multipliers times a weight > 0.
 
-        There the norm is the energy of the Neumann layer, ``|g|^2 = g' A_n g``, and the form of g and p
+        There the norm is the energy of the Neumann layer, ``|g|^2 = g' A_n g``, and the form of g and p::
 
             q^2 |g|^2 - |theta p + (1 - theta) g|^2 + weight M(g, p)
 

@@ -122,6 +122,7 @@ def test_a_sweep_of_a_sweep_is_refused(call, tmp_path):
 OUTPUT = {
     **dict.fromkeys(["run", "solve", "march", "compare", "demo", "sweep", "reproduce", "verify"], "DIR"),
     "bounds": "FILE.svg",
+    "layers": "FILE.svg",
     "explore": "FILE.html",
     "region": "FILE.svg",
     "certify": "FILE.json",
