@@ -25,10 +25,11 @@ from typing import Any
 
 from ndtheory.continuum.intervals import Interval
 from ndtheory.continuum.strip import MOST_PARTS, Part, Strip, Unproved, halves, line, smooth, times_smooth
+from ndtheory.errors import HypothesisError
 from ndtheory.scalar import Scalar
 
 #: The shortest part of wave numbers into which a proof divides, over its first end.
-SHORTEST = Fraction(1, 2**12)
+SHORTEST = Fraction(1, 2**20)
 
 #: A symmetric matrix of two rows: TT, NN and NT.
 Symmetric = tuple[Scalar, Scalar, Scalar]
@@ -37,14 +38,16 @@ Symmetric = tuple[Scalar, Scalar, Scalar]
 def disk(theta: Scalar, q: Scalar) -> tuple[Scalar, Scalar]:
     """The two points of the real axis on the circle of theta and q > 1 - theta.
 
-    Smaller disks belong to larger q.  Every small theta contracts where the criterion holds on the disk from 0 to 1, to
-    which those of q = 1 shrink as theta tends to 0.
+    HypothesisError for another q.  Smaller disks belong to larger q.  Every small theta contracts where the criterion
+    holds on the disk from 0 to 1, to which those of q = 1 shrink as theta tends to 0.
 
     Examples
     --------
     >>> disk(Fraction(7, 10), Fraction(1, 2))
     (Fraction(-7, 8), Fraction(7, 2))
     """
+    if not q > 1 - theta:
+        raise HypothesisError("q", q, f"a factor above 1 - theta = {1 - theta}")
     return -theta / (q + 1 - theta), theta / (q - 1 + theta)
 
 
@@ -158,6 +161,8 @@ class TwoLayers:
         True
         """
         multipliers = by.enclosed
+        if not min(multipliers.normal.lo, multipliers.alpha.lo, multipliers.beta.lo) > 0:
+            return False
         circle = (Interval.of(ends[0]), Interval.of(ends[1]))
         return self._everywhere(lambda part: _definite(pencil(*self.enclosed(part, multipliers, circle))))
 
@@ -175,6 +180,8 @@ class TwoLayers:
         Unproved
         """
         multipliers, size = by.enclosed, Interval.of(weight)
+        if not min(multipliers.normal.lo, multipliers.alpha.lo, multipliers.beta.lo, size.lo) > 0:
+            return False
         step = (Interval.of(theta), Interval.of(1 - theta), Interval.of(q).square())
 
         def holds(part: Part) -> bool:
@@ -190,8 +197,11 @@ class TwoLayers:
             if not parts:
                 return True
             part = parts.pop()
-            if holds(part):
-                continue
+            try:
+                if holds(part):
+                    continue
+            except ZeroDivisionError:  # a determinant whose enclosure on a long part contains 0
+                pass
             lo, hi = part
             if lo * self.radius > 2**12 if hi is None else hi - lo <= (lo or hi) * SHORTEST:
                 return False
@@ -204,7 +214,7 @@ class TwoLayers:
         """The arguments of :func:`pencil` enclosed on a part; times xi where both layers are thick beside the waves."""
         bodies = (self.contact, self.neumann)
         long = part[0] * min(body.thickness for body in bodies) >= 1
-        contact, neumann = (body.over_wave_number(part) if long else body.form(part) for body in bodies)
+        contact, neumann = (_stiffness(body, part, over=long) for body in bodies)
         flexible = (_inverse(contact, -1), _inverse(neumann, 1))
         if not long:
             return *flexible, ends, by, smooth(part, self.radius)
@@ -251,6 +261,16 @@ def _positive(form: list[list[Interval]]) -> bool:
             for j in range(i + 1):
                 rows[i][j] = rows[i][j] - rows[k][i] * rows[k][j] / rows[k][k]
     return True
+
+
+def _stiffness(strip: Strip, part: Part, *, over: bool) -> tuple[Interval, ...]:
+    """TT, NN and NT of a layer on a part, over xi where asked for; by the sharper of two enclosures."""
+    if over:
+        return strip.over_wave_number(part)
+    lo, hi = part
+    if hi is None or lo * strip.thickness < 1:
+        return strip.form(part)
+    return tuple(Interval.between(lo, hi) * entry for entry in strip.over_wave_number(part))
 
 
 def _inverse(form: tuple[Interval, ...], side: int) -> Symmetric:

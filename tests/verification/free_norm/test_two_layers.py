@@ -134,3 +134,23 @@ def test_beyond_the_threshold_nothing_is_said_to_contract():
         assert role["lyapunov"]["factor"] is role["energy"]["factor"] is None
         assert role["lyapunov"]["friction_threshold"]["value"] < 6
         assert json.dumps(role)
+
+
+@pytest.mark.parametrize(("depth", "nu"), [(("3", "0.3"), "0.3"), (("0.3", "0.6"), "0.3"), (("0.3", "0.3"), "0.45")])
+def test_layers_of_any_depth_and_ratio_are_decided_in_intervals(depth, nu):
+    neumann, contact = (
+        Strip(body=Moduli(young=E, poisson=nu), thickness=Fraction(d)) for E, d in zip((7, 2), depth, strict=True)
+    )
+    layers = Search(TwoLayers(contact=contact, neumann=neumann, radius=Fraction(1, 10)))
+    theta = Fraction(1, 2)
+    q = Fraction(layers.factor(0.5, 0.2)) * Fraction(102, 100)
+    best = layers.allowed(disk(0.5, float(q))).by
+    beta = Fraction(best.beta)
+    by = Multipliers(normal=Fraction(best.normal), alpha=Fraction(1, 100) / beta, beta=beta)
+    assert layers.layers.contracts(disk(theta, q), by)
+    assert not layers.layers.contracts(disk(theta, q), Multipliers(normal=by.normal, alpha=-by.alpha, beta=-by.beta))
+
+
+def test_a_factor_that_no_norm_can_have_is_refused():
+    with pytest.raises(HypothesisError, match="above 1 - theta"):
+        disk(Fraction(1, 10), Fraction(1, 2))
