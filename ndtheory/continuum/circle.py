@@ -18,13 +18,12 @@ both ends, and by one number: :class:`Pencil`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 from ndtheory.continuum.intervals import Interval
-from ndtheory.continuum.strip import MOST_PARTS, Part, Strip, Unproved, halves, line, smooth, times_smooth
+from ndtheory.continuum.strip import Part, Strip, everywhere, smooth, times_smooth
 from ndtheory.errors import HypothesisError
 from ndtheory.scalar import Scalar
 
@@ -65,6 +64,10 @@ class Multipliers:
         return Multipliers(**{name: Interval.of(value) for name, value in vars(self).items()})
 
 
+#: Both flexibilities, multipliers, and the square of the smoothing, as intervals.
+Enclosed = tuple[Symmetric, Symmetric, Multipliers, Interval]
+
+
 @dataclass(frozen=True)
 class Pencil:
     """The form M on a circle: ``(1 - u) low + u high + i turn sqrt(u (1 - u)) J``, 0 <= u <= 1, J' = -J.
@@ -88,8 +91,15 @@ class Pencil:
         return a * b - c**2, p * q - r**2, (a * q + p * b - self.turn**2) / 2 - c * r
 
 
+def flexibility(form: Sequence[Scalar], *, side: int) -> Symmetric:
+    """The inverse of TT, NN and NT of a layer on a side, -1 or 1, of the surface."""
+    along, across, mixed = form
+    determinant = along * across - mixed**2
+    return across / determinant, along / determinant, -side * mixed / determinant
+
+
 def pencil(
-    contact: Symmetric, neumann: Symmetric, ends: tuple[Scalar, Scalar], by: Multipliers, smooth_square: Scalar
+    contact: Symmetric, neumann: Symmetric, by: Multipliers, smooth_square: Scalar, ends: tuple[Scalar, Scalar]
 ) -> Pencil:
     """M of two flexibilities at one wave number on the circle with some ends; ``smooth_square`` is ``|smooth|^2``.
 
@@ -98,7 +108,7 @@ def pencil(
     Without friction M is ``A_c + Re(h) A_n``.
 
     >>> rigid = Multipliers(normal=Fraction(1), alpha=Fraction(0), beta=Fraction(0))
-    >>> found = pencil((2, 1, 0), (1, 1, 0), (Fraction(-1), Fraction(2)), rigid, 1)
+    >>> found = pencil((2, 1, 0), (1, 1, 0), rigid, 1, (Fraction(-1), Fraction(2)))
     >>> found.low[:2] == (1, 0), found.high[:2] == (4, 3), found.determinants == (0, 12, Fraction(3, 2))
     (True, True, True)
     """
@@ -142,12 +152,8 @@ class TwoLayers:
     def contracts(self, ends: tuple[Fraction, Fraction], by: Multipliers) -> bool:
         """True if M is proved to be positive definite at every wave number, on the circle with some ends.
 
-        Intervals of wave numbers are halved until M is on each of them; False where a short one leaves it open.
-
-        Raises
-        ------
-        Unproved
-            After MOST_PARTS intervals.
+        ``ends`` are those of :func:`disk`.  False, too, where :func:`~ndtheory.continuum.strip.everywhere` leaves it
+        open, and for multipliers that are not positive.
 
         Examples
         --------
@@ -160,11 +166,8 @@ class TwoLayers:
         >>> layers.contracts(disk(Fraction(7, 10), Fraction(36, 100)), by)
         True
         """
-        multipliers = by.enclosed
-        if not min(multipliers.normal.lo, multipliers.alpha.lo, multipliers.beta.lo) > 0:
-            return False
         circle = (Interval.of(ends[0]), Interval.of(ends[1]))
-        return self._everywhere(lambda part: _definite(pencil(*self.enclosed(part, multipliers, circle))))
+        return self._everywhere(by, lambda given: _definite(pencil(*given, circle)))
 
     def contracts_in_energy(self, theta: Fraction, q: Fraction, by: Multipliers, weight: Fraction) -> bool:
         """True if T_theta is proved to contract by q in the norm (5.21), by the multipliers times a weight > 0.
@@ -173,82 +176,56 @@ class TwoLayers:
 
             q^2 |g|^2 - |theta p + (1 - theta) g|^2 + weight M(g, p)
 
-        must be positive definite at every wave number, M being that of ``v = A_n g + A_c p``.
-
-        Raises
-        ------
-        Unproved
+        must be positive definite at every wave number, with ``v = A_n g + A_c p`` in M.
         """
-        multipliers, size = by.enclosed, Interval.of(weight)
-        if not min(multipliers.normal.lo, multipliers.alpha.lo, multipliers.beta.lo, size.lo) > 0:
-            return False
-        step = (Interval.of(theta), Interval.of(1 - theta), Interval.of(q).square())
+        size, step = Interval.of(weight), (Interval.of(theta), Interval.of(1 - theta), Interval.of(q).square())
+        return weight > 0 and self._everywhere(by, lambda given: _positive(energy_form(*given, step, size)))
 
-        def holds(part: Part) -> bool:
-            contact, neumann, _, scaled, smooth_square = self.enclosed(part, multipliers, ())
-            return _positive(energy_form(contact, neumann, step, scaled, smooth_square, size))
+    def _everywhere(self, by: Multipliers, holds: Callable[[Enclosed], bool]) -> bool:
+        sizes = [1 / self.contact.thickness, 1 / self.neumann.thickness, 6 / self.radius]
+        positive = min(vars(by).values()) > 0
+        return positive and everywhere(lambda part: holds(self.enclosed(part, by.enclosed)), sizes, shortest=SHORTEST)
 
-        return self._everywhere(holds)
+    def enclosed(self, part: Part, by: Multipliers) -> Enclosed:
+        """Both flexibilities, the multipliers and the smoothing for :func:`pencil` on a part of the wave numbers.
 
-    def _everywhere(self, holds: Callable[[Part], bool]) -> bool:
-        """True if something holds on parts of the wave numbers, halved until it does, that cover all of them."""
-        parts = line(1 / self.contact.thickness, 1 / self.neumann.thickness, 6 / self.radius)
-        for _ in range(MOST_PARTS):
-            if not parts:
-                return True
-            part = parts.pop()
-            try:
-                if holds(part):
-                    continue
-            except ZeroDivisionError:  # a determinant whose enclosure on a long part contains 0
-                pass
-            lo, hi = part
-            if lo * self.radius > 2**12 if hi is None else hi - lo <= (lo or hi) * SHORTEST:
-                return False
-            parts.extend(halves(part))
-        raise Unproved(f"{MOST_PARTS} parts of the wave numbers leave the circle criterion open")
-
-    def enclosed(
-        self, part: Part, by: Multipliers, ends: Any
-    ) -> tuple[Symmetric, Symmetric, Any, Multipliers, Interval]:
-        """The arguments of :func:`pencil` enclosed on a part; times xi where both layers are thick beside the waves."""
-        bodies = (self.contact, self.neumann)
-        long = part[0] * min(body.thickness for body in bodies) >= 1
-        contact, neumann = (_stiffness(body, part, over=long) for body in bodies)
-        flexible = (_inverse(contact, -1), _inverse(neumann, 1))
+        Times xi where both layers are thick beside the waves.
+        """
+        long = part[0] * min(self.contact.thickness, self.neumann.thickness) >= 1
+        contact = flexibility(_stiffness(self.contact, part, over=long), side=-1)
+        neumann = flexibility(_stiffness(self.neumann, part, over=long), side=1)
         if not long:
-            return *flexible, ends, by, smooth(part, self.radius)
+            return contact, neumann, by, smooth(part, self.radius)
         fading = Interval.between(0 if part[1] is None else 1 / part[1], 1 / part[0])
-        faded = Multipliers(normal=by.normal, alpha=by.alpha, beta=by.beta * fading)
-        return *flexible, ends, faded, times_smooth(part, self.radius)
+        return contact, neumann, replace(by, beta=by.beta * fading), times_smooth(part, self.radius)
 
 
 def energy_form(
     contact: Symmetric,
     neumann: Symmetric,
-    step: tuple[Scalar, Scalar, Scalar],
     by: Multipliers,
     smooth_square: Scalar,
+    step: tuple[Scalar, Scalar, Scalar],
     weight: Scalar,
 ) -> list[list[Scalar]]:
     """The form of :meth:`TwoLayers.contracts_in_energy`, of (g_T, g_N, p_T, p_N); ``step`` is theta, 1 - theta, q^2."""
     theta, rest, square = step
-    n, c = (((t, x), (x, a)) for t, a, x in (neumann, contact))
-    jump = [[*n[i], *c[i]] for i in (0, 1)]  # v_T and v_N
-    shares = (rest, rest, theta, theta)
-    form = [[-(shares[i] * shares[j] * n[i % 2][j % 2]) for j in range(4)] for i in range(4)]
-    for i in range(4):
-        for j in range(4):
-            if i < 2 and j < 2:
-                form[i][j] += square * n[i][j]
-            taken = by.beta * jump[0][i] * jump[0][j]
-            for component, factor in ((0, 1), (1, by.normal)):
-                for at, other in ((i, j), (j, i)):
-                    if at == 2 + component:
-                        form[i][j] += weight * factor * jump[component][other] / 2
-            form[i][j] -= weight * taken
-    form[1][1] -= weight * by.alpha * smooth_square
-    return form
+    (n_T, n_N, n_X), (c_T, c_N, c_X) = neumann, contact
+    v_T, v_N = (n_T, n_X, c_T, c_X), (n_X, n_N, c_X, c_N)
+    g_T, g_N, p_T, p_N = ([int(i == j) for j in range(4)] for i in range(4))
+    moved = lambda n_1, n_2: (rest * n_1, rest * n_2, theta * n_1, theta * n_2)  # A_n (theta p + (1 - theta) g)
+    terms = (
+        (square, g_T, (n_T, n_X, 0, 0)),
+        (square, g_N, (n_X, n_N, 0, 0)),
+        (-1, (rest, 0, theta, 0), moved(n_T, n_X)),
+        (-1, (0, rest, 0, theta), moved(n_X, n_N)),
+        (weight, p_T, v_T),
+        (weight * by.normal, p_N, v_N),
+        (-weight * by.alpha * smooth_square, g_N, g_N),
+        (-weight * by.beta, v_T, v_T),
+    )
+    entry = lambda i, j: sum(times * (a[i] * b[j] + a[j] * b[i]) / 2 for times, a, b in terms)
+    return [[entry(i, j) for j in range(4)] for i in range(4)]
 
 
 def _positive(form: list[list[Interval]]) -> bool:
@@ -271,13 +248,6 @@ def _stiffness(strip: Strip, part: Part, *, over: bool) -> tuple[Interval, ...]:
     if hi is None or lo * strip.thickness < 1:
         return strip.form(part)
     return tuple(Interval.between(lo, hi) * entry for entry in strip.over_wave_number(part))
-
-
-def _inverse(form: tuple[Interval, ...], side: int) -> Symmetric:
-    """The flexibility of a layer on a side, -1 or 1, of the surface."""
-    along, across, mixed = form
-    determinant = along * across - mixed.square()
-    return across / determinant, along / determinant, mixed * -side / determinant
 
 
 def _definite(form: Pencil) -> bool:

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -178,7 +180,7 @@ def largest_smoothed(strip: Strip, radius: Fraction) -> Interval:
         least = max(least, value(_middle(part)))
         if bound <= least * (1 + WIDTH):
             return Interval(least, bound)
-        for i, half in enumerate(halves(part)):
+        for i, half in enumerate(_halves(part)):
             heapq.heappush(heap, (upper(half).copy_negate(), 2 * count + i, half))
     raise Unproved(f"no supremum of S_NN up to {float(WIDTH)} in {MOST_PARTS} parts of the wave numbers")
 
@@ -199,11 +201,11 @@ def largest_ratio_of_strips(contact: Strip, neumann: Strip) -> Fraction:
     0.5144
     """
     pair = (contact, neumann)
-    parts = line(1 / contact.thickness, 1 / neumann.thickness)
-    seen = max(_eigenvalue(*(strip.form(part) for strip in pair)) for part in _points(parts))
+    parts = _points(line(*(1 / strip.thickness for strip in pair)))
+    seen = max(_eigenvalue(*(strip.form(part) for strip in pair)) for part in parts)
     for power in range(12, 0, -1):
         ratio = Fraction(seen) * (1 + Fraction(1, 2**power))
-        if _dominates(ratio, contact, neumann, parts):
+        if _dominates(ratio, pair):
             return ratio
     raise Unproved("no bound of S_c by S_n was found")
 
@@ -215,23 +217,35 @@ def _eigenvalue(contact: tuple[Interval, ...], neumann: tuple[Interval, ...]) ->
     return (trace + math.sqrt(max(trace**2 - 4 * determinant * (a * c - b * b), 0.0))) / (2 * determinant)
 
 
-def _dominates(ratio: Fraction, contact: Strip, neumann: Strip, line: list[Part]) -> bool:
-    parts, long = list(line), max(1 / contact.thickness, 1 / neumann.thickness)
+def _dominates(ratio: Fraction, pair: tuple[Strip, Strip]) -> bool:
+    sizes = [1 / strip.thickness for strip in pair]
+
+    def holds(part: Part) -> bool:
+        (a, c, b), (p, r, q) = (s.over_wave_number(part) if part[0] >= max(sizes) else s.form(part) for s in pair)
+        along, across, mixed = ratio * p - a, ratio * r - c, ratio * q + b  # on the other side NT changes its sign
+        return along.lo > 0 and across.lo > 0 and (along * across - mixed.square()).lo > 0
+
+    return everywhere(holds, sizes, shortest=Fraction(1, 2**16))
+
+
+def everywhere(holds: Callable[[Part], bool], sizes: Sequence[Fraction], *, shortest: Fraction) -> bool:
+    """True if something is shown to hold on parts that cover all wave numbers: each is halved until it does.
+
+    A part is halved, too, where its enclosure divides by an interval that contains 0.  False where MOST_PARTS of them
+    leave it open, or one that is as short as a share of its first end, or that lies far beyond all sizes.
+    """
+    parts = line(*sizes)
     for _ in range(MOST_PARTS):
         if not parts:
             return True
         part = parts.pop()
-        pair = (contact, neumann)
-        (a, c, b), (p, r, q) = (s.over_wave_number(part) if part[0] >= long else s.form(part) for s in pair)
-        along, across, mixed = ratio * p - a, ratio * r - c, ratio * q + b  # on the other side NT changes its sign
-        if along.lo > 0 and across.lo > 0 and (along * across - mixed.square()).lo > 0:
-            continue
+        with suppress(ZeroDivisionError):
+            if holds(part):
+                continue
         lo, hi = part
-        if hi is not None and hi - lo <= (lo or 1 / neumann.thickness) / 2**16:
+        if lo > 2**12 * max(sizes) if hi is None else hi - lo <= (lo or min(sizes)) * shortest:
             return False
-        if hi is None and lo * min(contact.thickness, neumann.thickness) > 2**12:
-            return False
-        parts.extend(halves(part))
+        parts.extend(_halves(part))
     return False
 
 
@@ -248,7 +262,7 @@ def _middle(part: Part) -> Fraction:
     return 2 * lo if hi is None else (lo + hi) / 2
 
 
-def halves(part: Part) -> tuple[Part, Part]:
+def _halves(part: Part) -> tuple[Part, Part]:
     lo, hi = part
     return (lo, _middle(part)), (_middle(part), hi)
 

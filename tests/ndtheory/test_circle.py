@@ -42,7 +42,7 @@ def on_circle(theta, q, phi):
 def test_two_matrices_and_one_number_are_the_form_on_the_whole_circle(contact, neumann, theta, share, lam, alpha, beta):
     q = 1 - theta + share * theta
     by, low_high = Multipliers(normal=lam, alpha=alpha / 100, beta=beta / 100), disk(theta, q)
-    found = pencil(contact, neumann, low_high, by, 0.7)
+    found = pencil(contact, neumann, by, 0.7, low_high)
     for phi in np.linspace(0, np.pi, 25):
         h = on_circle(theta, q, phi)
         M = form(contact, neumann, h, by, 0.7)
@@ -126,7 +126,7 @@ def test_what_is_proved_in_intervals_is_refused_with_a_little_less():
 @given(flexibilities(), flexibilities(), st.floats(0.1, 1), st.floats(0.1, 1.5), positive, positive, positive)
 def test_the_form_in_energy_is_its_definition(contact, neumann, theta, q, lam, alpha, beta):
     by, weight = Multipliers(normal=lam, alpha=alpha, beta=beta), 1.7
-    found = np.array(energy_form(contact, neumann, (theta, 1 - theta, q**2), by, 0.6, weight))
+    found = np.array(energy_form(contact, neumann, by, 0.6, (theta, 1 - theta, q**2), weight))
     A = lambda a: np.array([[a[0], a[2]], [a[2], a[1]]])
     x = np.array([0.3, -1.2, 0.7, 2.0])
     g, p = x[:2], x[2:]
@@ -142,8 +142,8 @@ def test_intervals_enclose_the_form_between_wave_numbers():
     by = Multipliers(normal=Fraction(11), alpha=Fraction(1, 10**6), beta=Fraction(4904)).enclosed
     ends = tuple(map(Interval.of, disk(Fraction(7, 10), Fraction("0.349"))))
     for lo, hi in ((1, 2), (5, 6), (20, 24)):
-        whole = pencil(*layers.enclosed((Fraction(lo), Fraction(hi)), by, ends))
-        point = pencil(*layers.enclosed((Fraction(lo + hi, 2),) * 2, by, ends))
+        whole = pencil(*layers.enclosed((Fraction(lo), Fraction(hi)), by), ends)
+        point = pencil(*layers.enclosed((Fraction(lo + hi, 2),) * 2, by), ends)
         numbers = lambda found: (*found.low, *found.high, found.turn)
         for wide, narrow in zip(numbers(whole), numbers(point), strict=True):
             assert wide.lo <= narrow.lo <= narrow.hi <= wide.hi

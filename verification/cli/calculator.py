@@ -11,7 +11,7 @@ from ndtheory import EDITIONS, Constants, EnergyConstants, HypothesisError
 from ndtheory.constants import take
 from verification.bounds.bound import NOT_ASKED, Subject
 from verification.bounds.table import ENERGY, SECTION_5, Calculated
-from verification.cli.console import deliver
+from verification.cli.console import as_figure, deliver
 from verification.cli.forms import cli
 from verification.cli.options import JSON, OneOf, one_file
 from verification.output.files import writing
@@ -97,15 +97,9 @@ def bounds(
             left_out = bound.edition is not None and constants is not None and edition not in (name, "both")
             results[name] = bound.absent(NOT_ASKED) if left_out else bound.evaluate(subject, theta)
     found = Calculated(constants=constants, energy=energy, theta=theta, results=results)
-    deliver(found, sections, as_json, writing(target, _draw), target)
+    deliver(found, sections, as_json, writing(target, as_figure), target)
     proved = any(result.factor is not None and result.proved for result in results.values())
     return 1 if check and not proved else 0
-
-
-def _draw(found: Calculated, path: Path) -> None:
-    from verification.figures import save
-
-    save(found.plot(), path)
 
 
 def _constants(given: Mapping[str, str | None]) -> Constants:

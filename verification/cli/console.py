@@ -177,6 +177,13 @@ def complain(text: str) -> None:
         spend(sys.stderr)
 
 
+def as_figure(found: Document, path: Path) -> None:
+    """Write the main figure of a result."""
+    from verification.figures import save
+
+    save(found.plot(), path)
+
+
 def deliver(
     document: D,
     sections: Callable[[D], Sections],

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ndtheory import HypothesisError
-from verification.cli.console import deliver
+from verification.cli.console import as_figure, deliver
 from verification.cli.forms import cli
 from verification.cli.options import JSON, one_file
 from verification.output.files import writing
@@ -57,10 +57,4 @@ def layers(
         )
     except HypothesisError as error:
         raise click.UsageError(f"--{error}", click.get_current_context()) from None
-    deliver(found, Document.sections, as_json, writing(target, lambda found, path: _draw(found, path)), target)
-
-
-def _draw(found: object, path: Path) -> None:
-    from verification.figures import save
-
-    save(found.plot(), path)  # type: ignore[attr-defined]
+    deliver(found, Document.sections, as_json, writing(target, as_figure), target)

@@ -18,10 +18,11 @@ FACTORS, POINTS = (1.0, 0.8, 0.6, 0.4), 18
 @draw.register
 def draw_layer_plane(found: Layers) -> Figure:
     """One panel for each role; the problem's theta and friction are marked."""
+    both = (found.layers, found.layers.swapped)
     with styled():
         figure = new_figure(7.2, 3.4)
         panels = figure.subplots(1, 2, sharey=True)
-        for ax, role, layers, colour in zip(panels, found.roles, found.both, BODIES, strict=True):
+        for ax, role, layers, colour in zip(panels, found.roles, both, BODIES, strict=True):
             search = Search(layers)
             for q, style in zip(FACTORS, ("-", "--", "-.", ":"), strict=True):
                 thetas = np.linspace(1 - q, 1, POINTS + 1)[1:]

@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import brentq, minimize_scalar
 
 from fem1d2d.mesh import Floats
-from ndtheory.continuum.circle import Multipliers, Symmetric, TwoLayers, disk, pencil
+from ndtheory.continuum.circle import Multipliers, Symmetric, TwoLayers, disk, flexibility, pencil
 from ndtheory.continuum.strip import Strip, symbols
 from verification.semidefinite.interior_point import Program, solve
 
@@ -68,8 +68,8 @@ class Search:
         long, short = 1 / max(depths), 1 / min(*depths, radius)
         inner = np.geomspace(BETWEEN[0] * long, BETWEEN[1] * short, WAVES)
         xi = np.array([ENDS[0] * long, *inner, ENDS[1] * short])
-        self.contact = flexibility(layers.contact, xi, side=-1)
-        self.neumann = flexibility(layers.neumann, xi, side=1)
+        self.contact = _layer(layers.contact, xi, side=-1)
+        self.neumann = _layer(layers.neumann, xi, side=1)
         self.smooth = np.maximum(np.sinc(radius * xi / (2 * np.pi)) ** 4, LEAST)
 
     def allowed(self, ends: tuple[float, float]) -> Allowed:
@@ -96,7 +96,7 @@ class Search:
     def largest_alpha(self, ends: tuple[float, float], normal: Floats, beta: Floats) -> Floats:
         """The largest alpha for which M is positive semidefinite at all wave numbers; -inf without one."""
         by = Multipliers(normal=normal[..., None], alpha=0.0, beta=beta[..., None])
-        form = pencil(self.contact, self.neumann, ends, by, 0.0)
+        form = pencil(self.contact, self.neumann, by, 0.0, ends)
         low, high = form.low[0], form.high[0]
         # the determinant falls by alpha times these, in Bernstein's form too
         x, y = ends
@@ -115,11 +115,8 @@ class Search:
         share = _least(missing, 0.0, 1 - NEAR)
         return None if share is None else 1 - share
 
-    def best_theta(self, k: float) -> tuple[float, float] | None:
-        """The theta with the least factor at friction k, to 0.005, and that factor; None where no theta contracts."""
-        largest = self.largest_theta(k)
-        if largest is None:
-            return None
+    def best_theta(self, k: float, largest: float) -> tuple[float, float]:
+        """The theta <= ``largest`` with the least factor at friction k, to 0.005, and that factor."""
         factor = lambda theta: self.factor(theta, k) or 1.0
         found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": 5e-3})
         return float(found.x), float(found.fun)
@@ -178,15 +175,13 @@ class Search:
         return self.allowed((0.0, 1.0)).friction
 
 
-def flexibility(strip: Strip, xi: Floats, *, side: int) -> Symmetric:
-    """TT, NN and NT of ``S^-1`` of a layer on a side, -1 or 1, of the surface, for wave numbers > 0."""
+def _layer(strip: Strip, xi: Floats, *, side: int) -> Symmetric:
+    """The flexibility of a layer for wave numbers > 0."""
     x = xi * float(strip.thickness)
     fading = np.exp(-2 * x)
     kappa, scale = float(strip.body.kappa), float(strip.body.shear) * xi
     form = symbols(kappa, (1 - fading**2) / 2, (np.expm1(-2 * x) / 2) ** 2, x * fading, x**2 * fading)
-    along, across, mixed = (scale * entry for entry in form)
-    determinant = along * across - mixed**2
-    return across / determinant, along / determinant, -side * mixed / determinant
+    return flexibility([scale * entry for entry in form], side=side)
 
 
 def _matrices(form: Symmetric) -> Floats:

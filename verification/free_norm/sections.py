@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from ndtheory import Number
+from collections.abc import Callable
+
 from verification import registry
 from verification.free_norm.two_layers import Layers, LayersRole
-from verification.show.numbers import figures, marked
-from verification.show.parts import Cell, Facts, Quantity, Section, Sections, closing, section, table
+from verification.show.numbers import at_least, at_most, figures
+from verification.show.parts import Cell, Facts, Sections, closing, section, table
 
 CLAIMS = "anything about bodies with ends, of which this is a prediction, or about the local law"
 
@@ -16,57 +17,42 @@ PROVED = (
 )
 
 
+#: The rows of the table: proved bounds are rounded to the safe side.
+QUANTITIES: dict[str, Callable[[LayersRole], Cell]] = {
+    "factor in the free norm": lambda role: at_most(role.lyapunov.factor),
+    "factor in the norm (5.21)": lambda role: at_most(role.energy.factor),
+    "best theta": lambda role: figures(role.lyapunov.theta_best),
+    "factor there": lambda role: at_most(role.lyapunov.factor_best),
+    "every theta contracts below": lambda role: at_least(role.lyapunov.theta_max),
+    "friction: small theta contracts below": lambda role: at_least(role.lyapunov.friction_threshold),
+}
+
+
 @registry.sections.register
 def sections(found: Layers) -> Sections:
     """The sections of the calculator for layers."""
-    neumann, contact = found.bodies
-    layer = lambda name, strip: Facts(
-        f"{name}: E = {float(strip.body.young):g}, nu = {float(strip.body.poisson):g}, depth {float(strip.thickness):g}"
-    )
-    about = f"k = {float(found.friction):g}, hat kernel of radius {float(found.radius):g}"
-    heads = ("quantity", f"Neumann body {found.roles[0].neumann}", f"Neumann body {found.roles[1].neumann}")
-    rows = [(words, *(_cell(role, at) for role in found.roles)) for words, at in QUANTITIES]
-    notes = [PROVED] * found.proved or ["in doubles; --verified proves the numbers in intervals"]
+    given, facts = found.inputs, []
+    for i in (0, 1):
+        young, poisson, depth = (given[name][i] for name in ("young", "poisson", "depth"))
+        facts.append(Facts(f"layer {i + 1}: E = {young:g}, nu = {poisson:g}, depth {depth:g}"))
+    facts.append(Facts(f"k = {given['friction']:g}, hat kernel of radius {given['radius']:g}"))
+    head = ("quantity", *(f"Neumann body {role.neumann}" for role in found.roles))
+    rows = [(words, *map(cell, found.roles)) for words, cell in QUANTITIES.items()]
+    note = PROVED if found.proved else "in doubles; --verified proves the numbers in intervals"
     return (
-        section("setting", "", layer("layer 1", neumann), layer("layer 2", contact), Facts(about)),
-        _contracts(found),
-        section("numbers", "WHICH THETA, WHICH FRICTION?", table(heads, rows, right=(1, 2)), *notes),
+        section("setting", "", *facts),
+        section("contracts", "DOES ONE STEP CONTRACT?", *map(_contracts, found.roles)),
+        section("numbers", "WHICH THETA, WHICH FRICTION?", table(head, rows, right=(1, 2)), note),
         closing(CLAIMS),
     )
 
 
-def _contracts(found: Layers) -> Section:
-    said = []
-    for role in found.roles:
-        if role.theta is None:
-            said.append(f"Neumann body {role.neumann}: no theta is proved to contract at this friction.")
-            continue
-        free, energy = role.lyapunov.factor, role.energy.factor
-        inside = "no norm is found in which it contracts" if free is None else f"a step contracts by {_figure(free)}"
-        plain = "nothing is found"
-        if energy is not None:
-            plain = f"the factor is {_figure(energy)}{', no contraction' * (energy.value >= 1)}"
-        said.append(f"Neumann body {role.neumann}, theta = {role.theta:g}: {inside}; in the norm (5.21) {plain}.")
-    return section("contracts", "DOES ONE STEP CONTRACT?", *said)
-
-
-#: The rows of the table.
-QUANTITIES = (
-    ("factor in the free norm", lambda role: role.lyapunov.factor),
-    ("factor in the norm (5.21)", lambda role: role.energy.factor),
-    ("best theta", lambda role: role.lyapunov.theta_best),
-    ("factor there", lambda role: role.lyapunov.factor_best),
-    ("every theta contracts below", lambda role: role.lyapunov.theta_max),
-    ("friction: small theta contracts below", lambda role: role.lyapunov.friction_threshold),
-)
-
-
-def _cell(role: LayersRole, at: object) -> Cell:
-    value = at(role)  # type: ignore[operator]
-    if not isinstance(value, Number):
-        return figures(value)
-    return Quantity(value.value, marked(str(_figure(value)), value.level), level=value.level)
-
-
-def _figure(value: Number) -> Cell:
-    return figures(value, 4)
+def _contracts(role: LayersRole) -> str:
+    if role.theta is None:
+        return f"Neumann body {role.neumann}: no theta is found to contract at this friction."
+    free, energy = role.lyapunov.factor, role.energy.factor
+    inside = "no norm is found in which it contracts" if free is None else f"a step contracts by {at_most(free)}"
+    plain = "no factor is found"
+    if energy is not None:
+        plain = f"the factor is {at_most(energy)}{', no contraction' * (energy.value >= 1)}"
+    return f"Neumann body {role.neumann}, theta = {role.theta:g}: {inside}; in the norm (5.21) {plain}."

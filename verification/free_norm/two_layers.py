@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar
@@ -10,7 +11,7 @@ from typing import Any, ClassVar
 from ndtheory import HypothesisError, Number
 from ndtheory.constants import relaxation_factor, take
 from ndtheory.continuum.circle import Multipliers, TwoLayers, disk
-from ndtheory.continuum.strip import Strip, Unproved
+from ndtheory.continuum.strip import Strip
 from ndtheory.keys import Key, Part, key, says
 from ndtheory.moduli import Moduli
 from ndtheory.number import above, below
@@ -44,7 +45,9 @@ class EnergyOfLayers(Part):
     """The factor in the norm (5.21)."""
 
     factor: Number | None = key(
-        "at theta, by multipliers that all wave numbers share; above 1 nothing contracts", **_none
+        "at theta, by multipliers that all wave numbers share; from 1 on it is no contraction",
+        null="without a theta, or where no multipliers are found",
+        default=None,
     )
 
 
@@ -77,31 +80,24 @@ class Layers(Document):
     schema: ClassVar[str] = "ndtheory.layers/1"
     units: ClassVar[Mapping[str, str]] = {"length": "that of --depth", "stress": "that of --young"}  # type: ignore[misc]
 
-    bodies: tuple[Strip, Strip]
-    radius: Fraction
+    layers: TwoLayers
     friction: Fraction
 
     @property
     @says(inside=INPUTS)
     def inputs(self) -> dict[str, Any]:
         """As given, the Neumann body of the first role first."""
+        both = (self.layers.neumann, self.layers.contact)
         return {
-            "young": [float(strip.body.young) for strip in self.bodies],
-            "poisson": [float(strip.body.poisson) for strip in self.bodies],
-            "depth": [float(strip.thickness) for strip in self.bodies],
-            "radius": float(self.radius),
+            "young": [float(strip.body.young) for strip in both],
+            "poisson": [float(strip.body.poisson) for strip in both],
+            "depth": [float(strip.thickness) for strip in both],
+            "radius": float(self.layers.radius),
             "friction": float(self.friction),
         }
 
     roles: tuple[LayersRole, LayersRole] = key("as given, and exchanged")
     proved: bool = key("true if all numbers with ends are proved for every wave number, in intervals")
-
-    @property
-    def both(self) -> tuple[TwoLayers, TwoLayers]:
-        """The layers in both roles."""
-        neumann, contact = self.bodies
-        given = TwoLayers(contact=contact, neumann=neumann, radius=self.radius)
-        return given, given.swapped
 
     @property
     def summary(self) -> str:
@@ -158,7 +154,7 @@ def two_layers(
     first, second = (
         _role(number, Search(layers), k, chosen, verified) for number, layers in ((1, given), (2, given.swapped))
     )
-    return Layers(bodies=(neumann, contact), radius=r, friction=k, roles=(first, second), proved=verified)
+    return Layers(layers=given, friction=k, roles=(first, second), proved=verified)
 
 
 def _pair(name: str, pair: Any) -> tuple[Any, Any]:
@@ -168,76 +164,41 @@ def _pair(name: str, pair: Any) -> tuple[Any, Any]:
 
 
 def _role(number: int, search: Search, k: Fraction, theta: Fraction | None, verified: bool) -> LayersRole:
-    friction = float(k)
-    proofs = _Proofs(search, k) if verified else _Doubles()
-    best = search.best_theta(friction)
-    if theta is None and best is not None:
-        theta = Fraction(best[0]).limit_denominator(10**4)
-    factor, energy = None if theta is None else search.factor(float(theta), friction), None
+    friction, layers = float(k), search.layers
+
+    def found(value: float, side: int, holds: Callable[[Fraction], bool]) -> Number:
+        """A number, above which (side 1) or below which (-1) something holds."""
+        return _proved(value, side, holds) if verified else Number.of_float(value)
+
+    def holds(ends: tuple[Fraction, Fraction], k: Fraction = k) -> bool:
+        allowed = search.allowed((float(ends[0]), float(ends[1])))
+        inside = (replace(allowed.by, beta=share * allowed.by.beta) for share in INSIDE)
+        return allowed.friction > k and any(layers.contracts(ends, _with_friction(by, k)) for by in inside)
+
+    def factor(theta: Fraction, q: float) -> Number:
+        return found(q, 1, lambda value: holds(disk(theta, value)))
+
+    known: dict[str, Any] = {}
+    if (largest := search.largest_theta(friction)) is not None:
+        known["theta_max"] = found(largest, -1, lambda value: holds(disk(value, Fraction(1))))
+        best, least = search.best_theta(friction, largest)
+        known |= {"theta_best": best, "factor_best": factor(Fraction(best), least)}
+        theta = Fraction(best).limit_denominator(10**4) if theta is None else theta
+    energy = None
     if theta is not None:
-        try:
-            energy = proofs.energy(theta, *search.energy_factor(float(theta), friction))
-        except LMIError:  # no multipliers at all
-            energy = None
-    largest, threshold = search.largest_theta(friction), proofs.threshold(search.friction_threshold)
-    free = FreeNorm(
-        factor=None if theta is None or factor is None else proofs.factor(theta, factor),
-        theta_best=None if best is None else best[0],
-        factor_best=None if best is None else proofs.factor(Fraction(best[0]), best[1]),
-        theta_max=None if largest is None else proofs.largest_theta(largest),
-        friction_threshold=threshold,
-        friction_limit=threshold,
-    )
+        if (q := search.factor(float(theta), friction)) is not None:
+            known["factor"] = factor(theta, q)
+        with suppress(LMIError):  # no multipliers at all
+            q, by, weight = search.energy_factor(float(theta), friction)
+            exact = _with_friction(by, k), Fraction(weight)
+            energy = found(q, 1, lambda value: layers.contracts_in_energy(theta, value, *exact))
+    threshold = found(search.friction_threshold, -1, lambda value: holds((Fraction(0), Fraction(1)), value))
     return LayersRole(
         neumann=number,
         theta=None if theta is None else float(theta),
         energy=EnergyOfLayers(factor=energy),
-        lyapunov=free,
+        lyapunov=FreeNorm(friction_threshold=threshold, friction_limit=threshold, **known),
     )
-
-
-class _Doubles:
-    """Numbers as the search finds them, in doubles at a few hundred wave numbers."""
-
-    def factor(self, theta: Fraction, q: float) -> Number:
-        return Number.of_float(q)
-
-    def largest_theta(self, theta: float) -> Number:
-        return Number.of_float(theta)
-
-    def threshold(self, k: float) -> Number:
-        return Number.of_float(k)
-
-    def energy(self, theta: Fraction, q: float, by: Multipliers, weight: float) -> Number:
-        return Number.of_float(q)
-
-
-class _Proofs(_Doubles):
-    """The same, moved to the safe side until intervals prove it for every wave number; in doubles where none do."""
-
-    def __init__(self, search: Search, k: Fraction) -> None:
-        self._search, self._k = search, k
-
-    def factor(self, theta: Fraction, q: float) -> Number:
-        return _proved(q, 1, lambda value: self._holds(disk(theta, value), self._k))
-
-    def largest_theta(self, theta: float) -> Number:
-        return _proved(theta, -1, lambda value: self._holds(disk(value, Fraction(1)), self._k))
-
-    def threshold(self, k: float) -> Number:
-        return _proved(k, -1, lambda value: self._holds((Fraction(0), Fraction(1)), value))
-
-    def energy(self, theta: Fraction, q: float, by: Multipliers, weight: float) -> Number:
-        exact = _with_friction(by, self._k)
-        holds = self._search.layers.contracts_in_energy
-        return _proved(q, 1, lambda value: holds(theta, value, exact, Fraction(weight)))
-
-    def _holds(self, ends: tuple[Fraction, Fraction], k: Fraction) -> bool:
-        found = self._search.allowed((float(ends[0]), float(ends[1])))
-        if found.friction <= k:
-            return False
-        inside = (replace(found.by, beta=share * found.by.beta) for share in INSIDE)
-        return any(self._search.layers.contracts(ends, _with_friction(by, k)) for by in inside)
 
 
 def _with_friction(by: Multipliers, k: Fraction) -> Multipliers:
@@ -247,13 +208,13 @@ def _with_friction(by: Multipliers, k: Fraction) -> Multipliers:
 
 
 def _proved(value: float, side: int, holds: Callable[[Fraction], bool]) -> Number:
-    """The nearest of some numbers beside one, above it (side 1) or below it (-1), for which something is proved."""
+    """The nearest of some numbers beside one, above it (side 1) or below it (-1), for which something is proved.
+
+    The number in doubles where it is proved for none.
+    """
     for margin in MARGINS:
         moved = Fraction(value * (1 + side * margin))
-        try:
-            if holds(moved):
-                end = above(moved) if side > 0 else below(moved)
-                return Number(value=end, **{"hi" if side > 0 else "lo": end}, level="guaranteed")
-        except Unproved:
-            continue
+        if holds(moved):
+            end = above(moved) if side > 0 else below(moved)
+            return Number(value=end, **{"hi" if side > 0 else "lo": end}, level="guaranteed")
     return Number.of_float(value)

@@ -210,7 +210,8 @@ def tampered(document, drawn):
 def test_what_is_accepted_of_tampered_certificates_is_so(made):
     document, drawn, accepted = made("small"), random.Random(7), 0
     problem = vf.Problem.from_dict(document["problem"])
-    for _ in range(100 if AT_NIGHT else 20):
+    draws = 100 if AT_NIGHT else 20
+    for _ in range(draws):
         given = tampered(document, drawn)
         found = check_again(given, problem)
         if found.accepted:
@@ -218,7 +219,7 @@ def test_what_is_accepted_of_tampered_certificates_is_so(made):
             assert found.same
             same_theta = given["claim"]["theta"] == document["claim"]["theta"]
             assert factor(given) >= Fraction(document["lower"]) * (1 - Fraction(1, 10**12)) or not same_theta
-    assert accepted
+    assert 0 < accepted < draws
 
 
 def test_a_certificate_of_a_changed_mesh_that_names_its_own_hash_is_about_that_mesh(made):

@@ -69,7 +69,7 @@ def test_multipliers_of_the_search_make_the_form_definite_and_a_little_more_fric
     best = layers.allowed(ends)
     for share, definite in ((0.999, True), (1.001, False)):
         by = Multipliers(normal=best.by.normal, alpha=share * best.by.alpha, beta=best.by.beta)
-        form = pencil(layers.contact, layers.neumann, ends, by, layers.smooth)
+        form = pencil(layers.contact, layers.neumann, by, layers.smooth, ends)
         low, high, middle = form.determinants
         u = np.linspace(0, 1, 2001)[:, None]
         found = low * (1 - u) ** 2 + 2 * middle * u * (1 - u) + high * u**2
