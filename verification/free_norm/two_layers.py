@@ -45,7 +45,7 @@ class EnergyOfLayers(Part):
     """The factor in the norm (5.21)."""
 
     factor: Number | None = key(
-        "at theta, by multipliers that all wave numbers share; from 1 on it is no contraction",
+        "at theta, by multipliers that all wave numbers share; 1 or more proves nothing",
         null="without a theta, or where no multipliers are found",
         default=None,
     )
