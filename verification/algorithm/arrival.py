@@ -48,7 +48,6 @@ def coupled_residual(pair: ContactPair, iterate: Iterate) -> float | None:
 def _violation(pair: ContactPair, iterate: Iterate) -> tuple[float, float]:
     """Return the largest violation of a contact condition by the joined state at g, and the size of g."""
     neumann, grid = pair.neumann, pair.contact.grid
-    size = math.sqrt(max(float(iterate.g @ (iterate.displacement - neumann.unloaded)), 0.0))
     off = iterate.g - iterate.image
     force = iterate.contact.force + pair.interface.spread(off)
     pressure, touching = force[grid.normal], iterate.contact.pattern.touching
@@ -59,9 +58,9 @@ def _violation(pair: ContactPair, iterate: Iterate) -> tuple[float, float]:
         shear = force[grid.tangential]
         bound = pair.bound(iterate.g)
         parts[grid.tangential, 2] = shear - np.clip(shear, -bound, bound)
-    violations = np.column_stack([pair.interface.carry_back(parts), off])
-    lengths = np.einsum("ij,ij->j", violations, neumann.flexibility(violations))
-    return math.sqrt(max(float(lengths.max()), 0.0)), size
+    forces = np.column_stack([pair.interface.carry_back(parts), off, iterate.g])
+    squares = np.maximum(np.einsum("ij,ij->j", forces, neumann.flexibility(forces)), 0.0)
+    return math.sqrt(float(squares[:-1].max())), math.sqrt(float(squares[-1]))
 
 
 def arrived(pair: ContactPair, iterate: Iterate) -> bool:

@@ -109,6 +109,24 @@ def test_the_coupled_residual_is_that_of_each_condition_at_each_node(data, step)
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-9)
 
 
+def test_the_residual_of_a_small_force_beside_large_loads_keeps_its_digits():
+    """A tiny theta: the displacement by g is lost in the one by the loads, and g is a multiple of its image."""
+    sides = {"shape": "rectangle", "x": [0, "0.05"], "cells": [1, 1], "poisson": 0}
+    body1 = sides | {"y": ["-0.001", 0], "young": 1, "fixed": ["bottom"], "body_force": [0, "0.05"]}
+    body2 = sides | {"y": [0, "0.01"], "young": "0.02", "fixed": ["top"]}
+    contact = {"interval": [0, "0.05"], "friction": 0, "radius": "0.025", "law": "nonlocal"}
+    data = {
+        "dimension": 2,
+        "body1": body1,
+        "body2": body2,
+        "contact": contact,
+        "iteration": {"neumann_body": 1, "theta": "1e-8"},
+    }
+    pair = vf.build(vf.Problem.from_dict(data))
+    first = next(state for state in vf.iterate(pair) if state.iteration == 1)
+    assert coupled_residual(pair, first) == pytest.approx(1e8, rel=1e-7)
+
+
 VIOLATIONS = ("an open node presses", "a node pulls", "friction exceeds its bound", "the contact body is not balanced")
 
 
