@@ -75,9 +75,6 @@ EQUIVALENT: dict[str, dict[str, str]] = {
     "verification/algorithm/loop.py": {
         "Ending.__init__: 0 -> 1": "the first residual is below infinity, which sets the count to 0"
     },
-    "verification/semidefinite/lipschitz.py": {
-        "_division: free & (pieces.slip == 0) -> free": "the slip of a node is fixed only once its sign is"
-    },
     "verification/contact/active_set.py": {
         "module: 4000000 -> 8000000": "more linear systems are kept, and no digit depends on what is kept"
     },

@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from halved_blocks import blocks, halved_by_hand
 from strategies import AT_NIGHT
-from test_rho_of_cells import blocks, halved_by_hand
 
 import verification as vf
 from ndtheory import Number
