@@ -13,7 +13,7 @@ from fem1d2d.mesh import Floats
 from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 from verification.semidefinite.conditions import Conditions, Pieces
-from verification.semidefinite.interior_point import Optimum, Program, Weights
+from verification.semidefinite.interior_point import Indices, Optimum, Program, Weights
 
 #: Entries that differ by less, relative to the diagonal or to the largest, are equal: rounding leaves 1e-14 on Section
 #: 6 with 97 contact nodes.
@@ -84,27 +84,47 @@ class Mirror:
         early = None if found.early is None else (found.early[0], reverse(found.early[1]))
         return replace(found, y=reverse(found.y), moments=self.turn @ found.moments @ self.turn.T, early=early)
 
+    @cached_property
+    def parts(self) -> tuple[Floats, ...]:
+        """An orthonormal basis of d_1 in two parts: what a reflection turns round, and what it does not."""
+        values, columns = np.linalg.eigh((self.turns[1] + self.turns[1].T) / 2)
+        return columns[:, values < 0], columns[:, values >= 0]
+
+    def halved(self, program: Program) -> tuple[Program, Indices]:
+        """A program for all pieces with one multiplier for a node and its image, and the place of each multiplier.
+
+        Its rows stand for their images, too: they are right in coordinates in which the form has no products of what a
+        reflection turns round with what it does not.
+        """
+        n = len(program.cones)
+        half = np.arange((n + 1) // 2)
+        twice = np.where(2 * half == n - 1, 1.0, 2.0)  # a node in the middle is its own image
+        kept = (n * np.arange(4)[:, None] + half).ravel()
+        place = (len(half) * np.arange(4)[:, None] + np.minimum(np.arange(n), np.arange(n)[::-1])).ravel()
+        halved = replace(
+            program,
+            left=np.tile(twice, 4)[:, None] * program.left[kept],
+            right=program.right[kept],
+            cones=place[program.cones[half]],
+            most=program.most[kept],
+            y=program.y[kept],
+        )
+        return halved, place
+
     def solved(self, program: Program, solve: Callable[[Program], Optimum]) -> Optimum:
         """A solver's answer to a program for all pieces, from one with half of the multipliers and two blocks.
 
         A node and its image may have equal multipliers, as the program is convex.  The form then has no products of
         what a reflection turns round with what it does not.
         """
-        n, (basis, odd) = len(program.cones), self.modes
-        half = np.arange((n + 1) // 2)
-        twice = np.where(2 * half == n - 1, 1.0, 2.0)  # a node in the middle is its own image
-        kept = (n * np.arange(4)[:, None] + half).ravel()
-        place = (len(half) * np.arange(4)[:, None] + np.minimum(np.arange(n), np.arange(n)[::-1])).ravel()
+        (basis, odd), (half, place) = self.modes, self.halved(program)
         found = solve(
             replace(
-                program,
+                half,
                 fixed=basis.T @ program.fixed @ basis,
                 free=basis.T @ program.free @ basis,
-                left=np.tile(twice, 4)[:, None] * program.left[kept] @ basis,
-                right=program.right[kept] @ basis,
-                cones=place[program.cones[half]],
-                most=program.most[kept],
-                y=program.y[kept],
+                left=half.left @ basis,
+                right=half.right @ basis,
                 blocks=(slice(0, odd), slice(odd, len(basis))),
             )
         )

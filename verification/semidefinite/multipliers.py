@@ -161,7 +161,7 @@ class QuadraticForms(Conditions):
         if evaluated is None:
             return None
         holds = self.traces.with_multipliers(multipliers, step=(theta, 1 - theta))
-        safe = _on_the_safe_side(evaluated, holds)
+        safe = on_the_safe_side(evaluated, holds)
         if safe is None:
             return None
         return _root(Certified(value=safe, evaluated=evaluated, proposed=math.nan, multipliers=multipliers))
@@ -292,7 +292,7 @@ class QuadraticForms(Conditions):
                     continue
                 if best is not None and evaluated >= best.value:  # nor do the others prove more: s is convex in them
                     break
-                safe = _on_the_safe_side(evaluated, holds(multipliers))
+                safe = on_the_safe_side(evaluated, holds(multipliers))
                 if safe is None:
                     continue
                 if best is None or safe < best.value:
@@ -364,7 +364,7 @@ def _root(found: Certified) -> Certified:
     return replace(found, value=above, evaluated=root(found.evaluated), proposed=root(found.proposed))
 
 
-def _on_the_safe_side(least: float, holds: Callable[[float], bool]) -> float | None:
+def on_the_safe_side(least: float, holds: Callable[[float], bool]) -> float | None:
     """The least s that multipliers prove, from what they give in doubles; None if there is none."""
     size = max(abs(least), 1e-3)
     share = _least_share(lambda share: holds(least + share * size))

@@ -82,14 +82,17 @@ class TraceForms:
         self._sizes = families(pair, k, kernel, np.abs(self._g), np.abs(force), np.abs(jump))
         # inner products over nodes (a transfer has them too), over traces twice, and the scalars, weights and sums
         self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.one_grid else 4) * contact.n + 30
+        self._size = size
         self._free = _changed(S_2, near[:1])
         self._free_error = self._error(np.abs(S_2), near[:1])
 
-    def _error(self, size: Floats, near: Sequence[Floats]) -> Floats:
-        """A bound of the rounding errors of a form in the coordinates of some columns, from the moduli of its terms."""
-        return np.asarray(
-            upwards(gamma(self._terms) * _changed(size, [np.abs(columns) for columns in near]), self._terms)
-        )
+    def _error(self, size: Floats, near: Sequence[Floats], more: int = 0) -> Floats:
+        """A bound of the rounding errors of a form in the coordinates of some columns, from the moduli of its terms.
+
+        ``more`` are the sums of a term beside those of :meth:`with_multipliers`.
+        """
+        terms = self._terms + more
+        return np.asarray(upwards(gamma(terms) * _changed(size, [np.abs(columns) for columns in near]), terms))
 
     def with_multipliers(
         self, multipliers: Sequence[Floats], *, cross: float = 0.0, step: tuple[float, float] | None = None
@@ -122,6 +125,25 @@ class TraceForms:
             matrix[d, d] += square * self._free
             error[d, d] += abs(square) * self._free_error
             return positive_definite(Enclosed(middle=matrix, radius=error))
+
+        return definite
+
+    def in_norm(self, Q: Floats, multipliers: Sequence[Floats], *, step: tuple[float, float]) -> Callable[..., bool]:
+        """Test of ``square |g|_Q^2 - |a p + b g|_Q^2 - conditions``, as above, with ``|g|_Q^2 = g' Q g``."""
+        a, b = step
+        row, row_size = a * self._p + b * self._g, abs(a) * self._p_size + abs(b) * np.abs(self._g)
+        fixed, free = -row.T @ Q @ row - weighed(multipliers, self._families), self._g.T @ Q @ self._g
+        sizes = (
+            row_size.T @ np.abs(Q) @ row_size + weighed([np.abs(m) for m in multipliers], self._sizes),
+            np.abs(self._g).T @ np.abs(Q) @ np.abs(self._g),
+        )
+        fixed, free = _changed(fixed, self._near), _changed(free, self._near)
+        fixed_error, free_error = (self._error(size, self._near, 6 * self._size) for size in sizes)
+
+        def definite(square: float) -> bool:
+            return positive_definite(
+                Enclosed(middle=fixed + square * free, radius=fixed_error + abs(square) * free_error)
+            )
 
         return definite
 
