@@ -131,7 +131,7 @@ def __dir__() -> list[str]:
 FILLS: dict[str, dict[str, tuple[str, ...]]] = {
     "laws": {"": ("interface.friction",)},
     "rules": {"": ("algorithm.relaxation",)},
-    "bounds": {"": ("bounds.table", "semidefinite.bound")},
+    "bounds": {"": ("bounds.table", "semidefinite.bound", "free_norm.bound")},
     "log formats": {"": ("coupling.log_formats",)},
     "proofs": {"": ("certificate.proved_constants", "semidefinite.losses")},
     "documents": {

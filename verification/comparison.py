@@ -113,6 +113,12 @@ class Comparison(Document):
         type="Semidefinite bound",
         null="where it was not worked out, as with more than 100 contact nodes",
     )
+    lyapunov = derived(
+        "the bound in a norm that the proof chooses",
+        lambda comparison: comparison.objects.get("lyapunov"),
+        type="Bound in the free norm",
+        absent="where it was not asked for, or not worked out",
+    )
 
     @property
     @says()
@@ -130,7 +136,10 @@ class Comparison(Document):
     @property
     def objects(self) -> dict[str, Any]:
         """The documents of single bounds, which are beside ``bounds``."""
-        own = [BOUNDS[name].objects(result, self.measured) for name, result in self.bounds.items()]
+        own = [
+            BOUNDS[name].objects(result, self.measured, self.verdicts[name].verdict)
+            for name, result in self.bounds.items()
+        ]
         return {key: value for objects in own for key, value in objects.items()}
 
     @property
@@ -213,9 +222,9 @@ def compare(
         Prove bounds of the constants for the exact data of the problem, of what follows from them, and the factor that
         one semidefinite program gives.  What could not be proved keeps the level ``float``.
     bounds : sequence of str, optional
-        Names of :data:`verification.registry.BOUNDS`; all by default.  The others are ``NOT_COMPUTED``.  Unless one
-        of the names needs the matrices of the bodies, as the semidefinite bound does, a comparison costs little more
-        than its run: the other slow parts, ``losses`` and ``cvxpy``, are left out, too.
+        Names of :data:`verification.registry.BOUNDS`; all but ``lyapunov`` by default.  The others are
+        ``NOT_COMPUTED``.  Unless one of the names needs the matrices of the bodies, as the semidefinite bound does, a
+        comparison costs little more than its run: the other slow parts, ``losses`` and ``cvxpy``, are left out, too.
     watch : callable
         Called with every iterate.
     progress : callable
@@ -253,7 +262,8 @@ def compare(
     choice, subject = choose(pair, theta, measured), Subject.of(pair, measured, exact=exact)
     calculated = [name for name in asked if BOUNDS[name].calculated]
     programs = [name for name in asked if not BOUNDS[name].calculated]
-    results = {name: bound.absent(INTERRUPTED if name in asked else NOT_ASKED) for name, bound in BOUNDS.items()}
+    left_out = {name: INTERRUPTED if name in asked else NOT_ASKED for name in (*chosen(None), *asked)}
+    results = {name: bound.absent(left_out[name]) for name, bound in BOUNDS.items() if name in left_out}
     results |= {name: BOUNDS[name].evaluate(subject, choice.theta) for name in calculated}
     listener.constants(measured, choice)
     if calculated:
@@ -266,7 +276,7 @@ def compare(
     linearised = left.work(finished.linearise, None)
     finished = linearised or replace(finished, interrupted=True).linearise()  # which says why there is nothing
     left.tell(listener.run, finished)
-    slow = " or ".join(name for name, bound in BOUNDS.items() if not bound.calculated)
+    slow = " or ".join(name for name in results if not BOUNDS[name].calculated)
     none: tuple[None, str] = (None, INTERRUPTED if programs else f"{NOT_ASKED}: it comes with {slow}")
     reference: tuple[Reference | None, str] = none
     lost: tuple[Losses | None, str] = none
@@ -292,7 +302,11 @@ def compare(
     outside = "outside the theorem: " + "; ".join(finished.outside) if finished.outside else ""
     if not isinstance(finished.rule, Constant) and not outside:
         outside = f"the bounds hold for a constant theta, not for {finished.relaxation}"
-    verdicts = {name: judge_bound(result, seen, outside) for name, result in results.items()}
+    in_its_norm = {
+        name: seen if result.norm is None else largest_step_ratio(pair, finished.iterates, result.norm)
+        for name, result in results.items()
+    }
+    verdicts = {name: judge_bound(result, in_its_norm[name], outside) for name, result in results.items()}
     verdicts["linearised"] = judge_forecast(finished)
     return Comparison(
         measured=measured,

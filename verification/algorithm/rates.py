@@ -143,6 +143,21 @@ def rate_at_the_end(residuals: Sequence[float], floors: Sequence[float], since: 
     )
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ForceNorm:
+    """A norm ``|g|_Q`` of forces on the Neumann grid, at least (5.21) and at most sqrt(condition) times (5.21).
+
+    ``matrix`` is Q, shape (N, N), ``|g|_Q^2 = g' Q g``.
+    """
+
+    matrix: Floats
+    condition: float
+
+    def of(self, force: Floats) -> float:
+        """The norm of a force."""
+        return math.sqrt(max(float(force @ self.matrix @ force), 0.0))
+
+
 @dataclass(frozen=True, kw_only=True)
 class StepRatio(Part):
     """The largest Lipschitz quotient of T_theta along a run, with its error.
@@ -160,7 +175,7 @@ class StepRatio(Part):
         Number of steps it was taken over; 0 where the start is the solution.
     """
 
-    value: float = key("in the norm (5.21)")
+    value: float = key("in the norm (5.21), unless another one is asked for")
     lo: float
     hi: float
     steps: int
@@ -172,8 +187,10 @@ class StepRatio(Part):
         return self.lo, self.hi
 
 
-def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRatio | None:
-    """Return the largest step ratio clear of the noise, or None where there is none.
+def largest_step_ratio(
+    pair: ContactPair, iterates: Sequence[Iterate], norm: ForceNorm | None = None
+) -> StepRatio | None:
+    """Return the largest step ratio clear of the noise, in (5.21) or another norm, or None where there is none.
 
     A step is judged by the noise of its two iterates; it may end below the noise, not begin there.  Every clear step
     counts for the lower end.  Only the steps furthest from the noise count for the upper end: a step near the noise
@@ -185,6 +202,9 @@ def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRa
         return StepRatio(value=0.0, lo=0.0, hi=0.0, steps=0)
     residual: Floats = np.array([iterate.residual for iterate in iterates])
     floor: Floats = np.array(noises(pair, iterates))
+    if norm is not None:
+        residual = np.array([norm.of(iterate.image - iterate.g) for iterate in iterates])
+        floor = math.sqrt(norm.condition) * floor
     begins = np.flatnonzero((residual[:-1] > CLEAR_OF_NOISE * floor[:-1]) & np.isfinite(residual[1:] + floor[1:]))
     if not len(begins):
         return None

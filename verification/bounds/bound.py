@@ -22,6 +22,7 @@ from ndtheory.number import Level, Numeric, above, below
 from verification.machine.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from verification.algorithm.rates import ForceNorm
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
 
@@ -139,6 +140,8 @@ class BoundResult(Part):
         True if the result is proved; the printed theorem is, where m >= 1.
     interval_level : {'exact', 'verified', 'guaranteed', 'float'}
         Of the interval: at any level but ``float`` each theta in it is proved to contract.
+    norm : ForceNorm or None
+        The norm in which the factor holds; None for (5.21).
     why, not_computed : str
         Why the factor is missing; why nothing was worked out.
     detail : object, optional
@@ -159,6 +162,7 @@ class BoundResult(Part):
     )
     interval_level: Level = "float"
     friction: Thresholds = key(spread=True, default_factory=Thresholds)
+    norm: ForceNorm | None = None
     why: str = ""
     not_computed: str = ""
     detail: Any = None
@@ -225,7 +229,7 @@ class NotComputed(RuntimeError):
 
 
 class Bound(ABC):
-    """A bound on the factor of one step in the norm (5.21).
+    """A bound on the factor of one step, in the norm (5.21) unless a result has its own.
 
     Attributes
     ----------
@@ -245,6 +249,8 @@ class Bound(ABC):
         True if its numbers depend on the unit of stress, which is then shown beside them.
     apart : bool
         True if the document of a comparison has it under its name, not among ``bounds.editions``.
+    on_request : bool
+        True if it is worked out only where its name is given.
     certifies : bool
         True if :func:`verification.certify` takes its factor: it is proved by multipliers that :meth:`enclose` returns,
         or by the multipliers of the theorem in energy norms.
@@ -264,6 +270,7 @@ class Bound(ABC):
     attained: ClassVar[bool] = False
     of_unit: ClassVar[bool] = False
     apart: ClassVar[bool] = False
+    on_request: ClassVar[bool] = False
     certifies: ClassVar[bool] = False
     divides: ClassVar[bool] = False
 
@@ -309,8 +316,10 @@ class Bound(ABC):
         """
         return None
 
-    def objects(self, result: BoundResult, measured: Measured) -> dict[str, Any]:
+    def objects(self, result: BoundResult, measured: Measured, verdict: str) -> dict[str, Any]:
         """The objects that the document of a comparison has of this bound beside ``bounds``, by their keys.
+
+        ``verdict`` is the one of the run on it.
 
         An object is None where the bound was not worked out; the document then says why.
         """
@@ -319,6 +328,14 @@ class Bound(ABC):
     def absent(self, why: str) -> BoundResult:
         """The result where nothing was worked out."""
         return BoundResult(name=self.name, proved=False, not_computed=why)
+
+
+def rest_of(factor: Number) -> Number:
+    """1 minus a factor."""
+    if factor.hi is None:
+        return Number.of_float(1 - factor.value)
+    least = below(1 - Fraction(factor.hi))
+    return Number(value=max(1 - factor.value, least), lo=least, level=factor.level)
 
 
 def bounded(results: Iterable[BoundResult]) -> str:

@@ -130,7 +130,7 @@ class Energy(Calculation):
         friction = Thresholds(on="any") if friction.every is None and not without else friction
         return self.answer(found, subject.energy.level, friction=friction, why=why)
 
-    def objects(self, result: BoundResult, measured: Measured) -> dict[str, Any]:
+    def objects(self, result: BoundResult, measured: Measured, verdict: str) -> dict[str, Any]:
         """Its document with both rho and both thresholds on k."""
         found = result.detail
         return {self.name: None if found is None else EnergyOfPair(found=found, measured=measured)}
@@ -191,11 +191,14 @@ def certifying() -> tuple[str, ...]:
 def strongest() -> str:
     """The bound that proposes a certificate where none is named: the last of our own, whatever is registered beside."""
     certify = certifying()
-    return ([name for name in BOUNDS.ours if name in certify] or certify)[-1]
+    ours = [name for name in BOUNDS.ours if name in certify and not BOUNDS[name].on_request]
+    return (ours or certify)[-1]
 
 
 def chosen(names: Sequence[str] | str | None) -> tuple[str, ...]:
-    """The names of some bounds, of a sequence or of a text with commas, in the order of :data:`BOUNDS`; None for all.
+    """The names of some bounds, of a sequence or of a text with commas, in the order of :data:`BOUNDS`.
+
+    None stands for all but those that are worked out on request.
 
     Raises
     ------
@@ -208,7 +211,7 @@ def chosen(names: Sequence[str] | str | None) -> tuple[str, ...]:
     ('printed', 'energy')
     """
     if names is None:
-        return tuple(BOUNDS)
+        return tuple(name for name, bound in BOUNDS.items() if not bound.on_request)
     listed = [name.strip() for name in names.split(",")] if isinstance(names, str) else list(names)
     known = ", ".join(BOUNDS)
     if not any(listed):

@@ -5,11 +5,11 @@ iteration takes a force psi to ``T_theta psi = theta T psi + (1 - theta) psi``: 
 T psi is the reaction of the contact body, which is pressed against it.  A certificate describes the discrete bodies in
 rational numbers and claims that for all forces psi, psi~, whatever the loads, prescribed displacements and gaps::
 
-    |T_theta psi - T_theta psi~| <= factor |psi - psi~|,    |g|^2 = g' S_n^-1 g,
+    |T_theta psi - T_theta psi~| <= factor |psi - psi~|,    |g|^2 = g' S_n^-1 g   or   |g|^2 = g' Q g,
 
-S_n and S_c being the stiffnesses of the Neumann and the contact body, as the contact nodes see them.  ``check`` is the
-outline of the proof, and each function says one step of it.  Numbers of the file are rational; those computed are balls
-of Arb, which hold the exact results, so that what holds of balls is proved.
+where the claim has a norm Q.  S_n and S_c are the stiffnesses of the Neumann and the contact body, as the contact nodes
+see them.  ``check`` is the outline of the proof, and each function says one step of it.  Numbers of the file are
+rational; those computed are balls of Arb, which hold the exact results, so that what holds of balls is proved.
 
 Whether bodies, normals, transfer and a kernel without a radius belong to a certain problem is not decided here.
 """
@@ -60,7 +60,7 @@ def check(discrete: Json, claim: Json, eliminated: Callable[..., arb_mat] | None
     steps = two_steps(discrete, k, eliminated or surface_stiffness)
     contact_positions(discrete)  # which demands the weights of the trapezoid rule
     demand("radius" not in claim or kernel_is_hat(discrete, claim["radius"]), "as kernel the hat of the radius claimed")
-    claimed = margin(steps, theta, factor)
+    claimed = margin(steps, theta, factor, norm(steps, claim.get("norm")))
     for leaf, cases in leaves(claim["multipliers"]):
         values, left, right = zip(*inequalities(steps, leaf), *equations(steps, leaf, cases), strict=True)
         weighted = arb_mat([[arb(value) * x for x in form] for value, form in zip(values, right, strict=True)])
@@ -215,10 +215,26 @@ def two_steps(discrete: Json, k: fmpq, eliminated: Callable[..., arb_mat]) -> Tw
     return TwoSteps(S_n, moved, p, v, padded, [k * rational(w) for w in discrete["weights"] if k != 0])
 
 
-def margin(steps: TwoSteps, theta: fmpq, factor: fmpq) -> arb_mat:
-    """``factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2`` as a matrix in (d, c); ``|g|^2 = d' S_n d``."""
-    corner, mixed = (factor**2 - (1 - theta) ** 2) * steps.S_n, -theta * (1 - theta) * steps.moved
-    square = -(theta**2) * steps.moved.transpose() * steps.S_n.solve(steps.moved)
+def norm(steps: TwoSteps, given: Json) -> arb_mat | None:
+    """The Q of a norm, whose lower triangle is listed: ``g' S_n^-1 g < g' Q g < condition g' S_n^-1 g``."""
+    if given is None:
+        return None
+    lower, condition, size = given["matrix"], rational(given["condition"]), steps.S_n.nrows()
+    demand([len(row) for row in lower] == [*range(1, size + 1)], f"a lower triangle of {size} rows")
+    Q = arb_mat([[rational(lower[max(i, j)][min(i, j)]) for j in range(size)] for i in range(size)])
+    energy = steps.S_n * Q * steps.S_n
+    between = positive_definite(energy - steps.S_n) and positive_definite(condition * steps.S_n - energy)
+    demand(between, "a norm between (5.21) and its condition times (5.21)")
+    return Q
+
+
+def margin(steps: TwoSteps, theta: fmpq, factor: fmpq, Q: arb_mat | None) -> arb_mat:
+    """``factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2`` as a matrix in (d, c), with ``g = S_n d``."""
+    S, moved = steps.S_n, steps.moved
+    weigh: Callable[[arb_mat], arb_mat] = S.solve if Q is None else lambda forces: Q * forces
+    of_g, of_both = (S, moved) if Q is None else (S * weigh(S), S * weigh(moved))
+    corner, mixed = (factor**2 - (1 - theta) ** 2) * of_g, -theta * (1 - theta) * of_both
+    square = -(theta**2) * moved.transpose() * weigh(moved)
     halves = ((corner, mixed), (mixed.transpose(), square))
     return arb_mat([a + b for half in halves for a, b in zip(*(part.tolist() for part in half), strict=True)])
 
@@ -325,7 +341,11 @@ def words(document: Json) -> str:
     friction = f"k {discrete['friction']} with the {kernel}" if rational(discrete["friction"]) != 0 else "no friction"
     at = f"Neumann problem: body {discrete['neumann_body']}, {friction}, theta {claim['theta']}"
     spare = float(arb(1 - rational(claim["factor"])).mid())
-    return "; ".join([*bodies, at, f"Lipschitz constant at most 1 - {spare:.10g}"])
+    claimed = f"Lipschitz constant at most 1 - {spare:.10g} in the norm (5.21)"
+    if "norm" in claim:
+        condition = float(arb(rational(claim["norm"]["condition"])).mid())
+        claimed = f"{claimed.removesuffix('(5.21)')}Q of the certificate, of condition {condition:.6g} in (5.21)"
+    return "; ".join([*bodies, at, claimed])
 
 
 def examine(document: Json) -> None:

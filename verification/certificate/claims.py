@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 
 from fem1d2d.element import lacks
 from ndtheory.keys import Part, key
+from verification.algorithm.rates import ForceNorm
 from verification.certificate.check import check, surface_stiffness
 from verification.certificate.exact_bodies import ExactInterface, NotExact, exact_normals, exact_points
 from verification.constants.measured import FROM_MATRICES
 from verification.dense import STILL
-from verification.interface.body import Body
+from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair, pair_from
 from verification.machine.progress import Progress, silent
 from verification.problem import Problem
@@ -43,6 +44,9 @@ FEWEST, UNKNOWNS, STEP, MOST = 96, 24, 32, 1280
 #: Bits that the stiffness matrices keep beyond their condition squared: MARGINS ask the checker to tell 1e-10 of 1
 #: minus the factor, which is 2^-33 of it, and this leaves as many again.
 LEFT = 64
+
+#: The condition of a norm is claimed larger by this share.
+WIDER = 1e-4
 
 #: Digits of a multiplier and of a factor.
 DIGITS = 12
@@ -69,10 +73,16 @@ class Claims:
         self.discrete, self.progress = discrete, progress
         self.known: dict[Any, Any] = {} if known is None else known
 
-    def accepted(self, theta: Fraction, factor: Fraction, multipliers: dict[str, Any]) -> dict[str, Any] | None:
-        """The claim of a factor with the bits in which the checker accepts it; None where it does not."""
+    def accepted(
+        self, theta: Fraction, factor: Fraction, multipliers: dict[str, Any], norm: dict[str, Any] | None = None
+    ) -> dict[str, Any] | None:
+        """The claim of a factor with the bits in which the checker accepts it; None where it does not.
+
+        ``norm`` is the one of the claim, as :func:`written_norm` has it; (5.21) by default.
+        """
         for bits in sorted({self.bits, _allowed(1.5 * self.bits)}):
             claim = {"theta": str(theta), "factor": str(factor), "bits": bits, "multipliers": multipliers}
+            claim |= {} if norm is None else {"norm": norm}
             words = f"checking theta = {float(theta):.6g}, factor {float(factor):.10g} in balls of {bits} bits"
             self.progress(words, None)
             try:
@@ -117,10 +127,12 @@ class Claims:
                 self.known[key] = surface_stiffness(body, both=both)
         return self.known[key]
 
-    def confirmed(self, theta: Fraction, spare: float, multipliers: dict[str, Any]) -> dict[str, Any] | None:
+    def confirmed(
+        self, theta: Fraction, spare: float, multipliers: dict[str, Any], norm: dict[str, Any] | None = None
+    ) -> dict[str, Any] | None:
         """A claim that is accepted, its factor below 1 by nearly ``spare``; None where none is."""
         wanted = (1 - _decimal(spare * (1 - margin), ROUND_DOWN) for margin in MARGINS)
-        return next(filter(None, (self.accepted(theta, factor, multipliers) for factor in wanted)), None)
+        return next(filter(None, (self.accepted(theta, factor, multipliers, norm) for factor in wanted)), None)
 
 
 class Confirmation:
@@ -147,8 +159,12 @@ class Confirmation:
             raise NoCertificate(str(error)) from None
         self.pair, self.problem, self.progress, self._claims = pair, pair.problem, progress, claims
 
-    def factor(self, theta: Fraction, factor: float, multipliers: Weights) -> Fraction:
+    def factor(
+        self, theta: Fraction, factor: float, multipliers: Weights, norm: dict[str, Any] | None = None
+    ) -> Fraction:
         """A factor of one step that is confirmed, larger than the one that the multipliers prove in doubles.
+
+        In a norm that :func:`written_norm` gives, (5.21) by default.
 
         Raises
         ------
@@ -156,10 +172,28 @@ class Confirmation:
         """
         if not factor < 1:
             raise NoCertificate(f"the factor of one program is {factor:.4g}, which does not contract")
-        claim = self._claims.confirmed(theta, 1 - factor, written(multipliers))
+        claim = self._claims.confirmed(theta, 1 - factor, written(multipliers), norm)
         if claim is None:
             raise NoCertificate(f"the factor of one program {NOT_CONFIRMED.format(1 - factor)}")
         return Fraction(claim["factor"])
+
+    def contracts(self, theta: float, multipliers: Weights, norm: dict[str, Any], k: float | None = None) -> None:
+        """Confirm that every theta up to one contracts in a norm, at the pair's friction or at k and below.
+
+        With 1 as the factor the multiplied form is positive definite, so that the factor is below 1; smaller thetas
+        contract in the same norm, and the conditions of a larger friction hold at a smaller one.
+
+        Raises
+        ------
+        NoCertificate
+        """
+        claims = self._claims
+        if k is not None:
+            described = describe(self.problem, replace(self.pair, friction=Fraction(k)))
+            claims = Claims(described, self.progress, self._claims.known)
+        if claims.accepted(Fraction(theta), Fraction(1), written(multipliers), norm) is None:
+            at = "" if k is None else f", k = {k:.6g}"
+            raise NoCertificate(f"theta = {theta:.6g}{at} is not confirmed in rationals")
 
     def theta_max(self, theta: float, multipliers: Weights) -> Fraction:
         """A theta up to which every one contracts, a little below the one in doubles, from its multipliers over theta.
@@ -216,13 +250,20 @@ def written(multipliers: Weights, equal: Sequence[float] = ()) -> dict[str, Any]
     return found | ({"equal": [str(_decimal(float(value))) for value in equal]} if len(equal) else {})
 
 
+def written_norm(norm: ForceNorm, neumann: Condensed) -> dict[str, Any]:
+    """A norm as the checker reads it: rationals, its normal components along y."""
+    matrix = neumann.orient_form(norm.matrix)
+    rows = [[str(_decimal(float(value))) for value in row[: i + 1]] for i, row in enumerate(matrix)]
+    return {"matrix": rows, "condition": str(_decimal(norm.condition * (1 + WIDER), ROUND_UP, digits=5))}
+
+
 def _allowed(bits: float) -> int:
     return min(STEP * math.ceil(bits / STEP), MOST)
 
 
-def _decimal(value: float, rounding: str | None = None) -> Fraction:
+def _decimal(value: float, rounding: str | None = None, digits: int = DIGITS) -> Fraction:
     """A double as a decimal of some digits."""
-    return Fraction(Context(prec=DIGITS, rounding=rounding).create_decimal(Decimal(value)))
+    return Fraction(Context(prec=digits, rounding=rounding).create_decimal(Decimal(value)))
 
 
 # --- the bodies -------------------------------------------------------------------------------------------------------

@@ -20,7 +20,16 @@ from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
 from verification.bounds.table import certifying, strongest
 from verification.certificate import check
-from verification.certificate.claims import NOT_CONFIRMED, PLANE, Claims, NoCertificate, describe, same, written
+from verification.certificate.claims import (
+    NOT_CONFIRMED,
+    PLANE,
+    Claims,
+    NoCertificate,
+    describe,
+    same,
+    written,
+    written_norm,
+)
 from verification.constants import Measured, measure
 from verification.document import Document
 from verification.interface.pair import UNITS, ContactPair, pair_from
@@ -61,15 +70,25 @@ _multipliers = partial(Key, says="rationals, one for each contact node or one fo
 #: The keys of a claim.
 CLAIM = {
     "theta": _rational(says="rational: the relaxation factor"),
-    "factor": _rational(
-        says=r"rational: a Lipschitz constant of $T_\theta$ in the norm (5.21), over all loads and gaps"
-    ),
+    "factor": _rational(says=r"rational: a Lipschitz constant of $T_\theta$ in the norm, over all loads and gaps"),
     "radius": Key(
         says="rational: the kernel is the hat of this radius, which the checker decides",
         type="text",
         unit="length",
         absent="without friction, and where the kernel is another one: $k$ varies, or grids that differ meet along a"
         " line that is not level",
+    ),
+    "norm.matrix": Key(
+        says=r"rationals: rows of the lower triangle of $Q$, $|g|^2 = g' Q g$; without it the norm is (5.21)",
+        type="list of free",
+        unit="length/stress",
+        absent="for another edition than `lyapunov`",
+    ),
+    "norm.condition": Key(
+        says="rational: at most the largest $g' Q g$ where (5.21) is 1, and 1 the least",
+        type="text",
+        unit="1",
+        absent="for another edition than `lyapunov`",
     ),
     "bits": Key(says="bits of the balls in which the checker decides", type="integer", unit=""),
     "multipliers.lambda": _multipliers(unit="1"),
@@ -105,11 +124,12 @@ class Certificate(Document):
     kind: ClassVar[str] = "contraction"
 
     problem: Problem
-    edition: str = key("which bound proposed the factor: `lmi`, `energy` or `repaired`")
+    edition: str = key("which bound proposed the factor: `lmi`, `energy`, `repaired` or `lyapunov`")
     claim: dict[str, Any] = key(inside=CLAIM, type="object")
     lower: float | None = key(
-        "the largest factor found of two forces, in doubles: no certificate proves less",
-        null="for another edition than `lmi`",
+        "the largest factor found of two forces, in doubles: no certificate proves less; for `lyapunov` the largest"
+        " spectral radius found of a piece",
+        null="for another edition than `lmi` and `lyapunov`",
         why="not computed for this edition",
     )
     discrete: dict[str, Any] = key("bodies and what joins them", inside=DISCRETE, type="object")
@@ -160,8 +180,8 @@ def certify(
     theta : number or 'auto', optional
         The problem's by default.
     edition : str, optional
-        Name of the bound that proposes factor and multipliers, 'repaired', 'energy' or 'lmi' among ours; by default the
-        strongest one that certifies.
+        Name of the bound that proposes factor and multipliers, 'repaired', 'energy', 'lmi' or, in its own norm,
+        'lyapunov' among ours; by default the strongest one in the norm (5.21).
     exact : bool
         Divide the pieces of T into sets until the factor is nearly the largest that occurs; the certificate has
         multipliers for each set.  Only the edition 'lmi' does that.
@@ -201,9 +221,9 @@ def certify(
     chosen = choose(pair, theta, measured).theta
     assert isinstance(chosen, Fraction)
     progress(f"{BOUNDS[edition].words} proposes multipliers", None)
-    spare, multipliers, lower = _proposed(pair, measured, chosen, edition, exact, progress)
+    spare, multipliers, lower, norm = _proposed(pair, measured, chosen, edition, exact, progress)
     discrete = describe(problem, pair)
-    claim = Claims(discrete, progress).confirmed(chosen, spare, multipliers)
+    claim = Claims(discrete, progress).confirmed(chosen, spare, multipliers, norm)
     if claim is None:
         raise NoCertificate(f"{BOUNDS[edition].words} {NOT_CONFIRMED.format(spare)}")
     radius = problem.contact.radius
@@ -267,18 +287,19 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
 
 def _proposed(
     pair: ContactPair, measured: Measured, theta: Fraction, edition: str, exact: bool, progress: Progress
-) -> tuple[float, dict[str, Any], float | None]:
-    """1 minus the factor of a bound, multipliers that should prove it, and the largest factor found."""
+) -> tuple[float, dict[str, Any], float | None, dict[str, Any] | None]:
+    """1 minus the factor of a bound, multipliers that should prove it, the largest factor found, and the norm."""
 
-    bound = BOUNDS[edition]
+    bound, norm = BOUNDS[edition], None
     try:
         forms = QuadraticForms(pair, measured)
         found = bound.enclose(pair, forms, float(theta), exact=exact, progress=progress)
         if found is not None:
             lower, spare = found.lower, 1 - found.upper.value
             multipliers = _of_tree(found.tree, forms, pair.neumann.upward)
+            norm = None if found.norm is None else written_norm(found.norm, pair.neumann)
             why = f"its bound of the factor is {found.upper.value:.4g}"
-            if not exact and lower < 1:
+            if not exact and lower < 1 and bound.divides:
                 why += f", the largest factor found {lower:.4g}; dividing the pieces (exact) may prove more"
         else:
             result = bound.evaluate(Subject.of(pair, measured), theta)
@@ -291,7 +312,7 @@ def _proposed(
     if not spare > 0:
         at = f"theta = {float(theta):g}, k = {float(pair.friction):g}"
         raise NoCertificate(f"{bound.words} proves no contraction at {at}: {why}")
-    return spare, multipliers, lower
+    return spare, multipliers, lower, norm
 
 
 def _of_tree(

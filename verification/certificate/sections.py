@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from shlex import quote
@@ -28,11 +29,22 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     spare, theta = float(1 - found.factor), float(found.theta)
     few = lambda digits: rounded(float(found.factor), digits, up=True)
     factor = f"1 - {rounded(spare, 2, up=False)}" if 0 < spare < 1e-3 else few(4)
+    norm = found.claim.get("norm")
+    name = "the norm (5.21)" if norm is None else "the norm Q of the certificate"
     claim.append(
-        f"On these meshes a step with theta = {theta:g} multiplies the difference of two forces, in the norm (5.21), by"
+        f"On these meshes a step with theta = {theta:g} multiplies the difference of two forces, in {name}, by"
         f" {factor} at most, for all loads and gaps: it contracts.  Level: verified."
     )
-    if found.lower is not None:
+    if norm is not None:
+        root = rounded(float(Fraction(norm["condition"])) ** 0.5, 4, up=True)
+        claim.append(
+            f"Q is at least (5.21) and at most {root} times (5.21), so after i steps the error in (5.21) is at most"
+            f" {root} x {few(4)}^i times the first one."
+        )
+        claim.append(
+            f"A piece of T has the spectral radius {found.lower:.4g} (in doubles): no norm has a smaller factor."
+        )
+    elif found.lower is not None:
         gap = float(found.factor) / found.lower - 1
         claim.append(
             f"Proved factor {few(6)}, attained {found.lower:.6g} by two forces (in doubles): {max(gap, 0.0):.2%} apart."

@@ -21,8 +21,9 @@ MOST_BYTES = 100_000_000
 
 def _editions() -> Sequence[str]:
     from verification.bounds.table import certifying
+    from verification.registry import BOUNDS
 
-    return certifying()[::-1]
+    return [name for name in certifying()[::-1] if not BOUNDS[name].on_request]
 
 
 @cli.command()
@@ -31,6 +32,12 @@ def _editions() -> Sequence[str]:
 @THETA
 @SWAP
 @click.option("--edition", type=Registered(_editions), help="Bound that proposes the factor; the strongest by default.")
+@click.option(
+    "--norm",
+    type=click.Choice(["energy", "lyapunov"]),
+    default="energy",
+    help="The norm of the claim: energy is (5.21), lyapunov one that the proof chooses.",
+)
 @click.option(
     "--exact",
     is_flag=True,
@@ -54,6 +61,7 @@ def certify(
     theta: str | None,
     swap: bool,
     edition: Any,
+    norm: str,
     exact: bool,
     continuum: bool,
     target: Path | None,
@@ -72,6 +80,7 @@ def certify(
     Examples:
       ndtheory certify my.toml --theta 0.5 -o certificate.json
       ndtheory certify my.toml --exact -o certificate.json
+      ndtheory certify my.toml --norm lyapunov -o certificate.json
       ndtheory certify --check certificate.json
       ndtheory certify --check certificate.json my.toml
       ndtheory certify --continuum my.toml --theta 0.6
@@ -79,8 +88,10 @@ def certify(
     context = click.get_current_context()
     used = {"--theta": theta, "-o": target, "--edition": edition, "--check": given}
     used |= {"--exact": exact or None, "--continuum": continuum or None}
+    used["--norm lyapunov"] = norm if norm != "energy" else None
     for option, *others in (
-        ("--check", "--theta", "-o", "--edition", "--continuum", "--exact"),
+        ("--check", "--theta", "-o", "--edition", "--continuum", "--exact", "--norm lyapunov"),
+        ("--norm lyapunov", "--edition", "--continuum", "--exact"),
         ("--continuum", "--edition", "--exact"),
         ("--edition", "--exact"),
     ):
@@ -101,13 +112,14 @@ def certify(
     from verification.certificate.contraction import certify as prove
     from verification.output.files import writing
 
+    own = None if norm == "energy" else norm
     sections: Callable[[Any], Sections] = shown.continuum if continuum else lambda found: shown.sections(found, target)
     try:
         with stages() as tell:
             found: Any = (
                 certify_continuum(problem, tell)
                 if continuum
-                else prove(problem, edition=edition, exact=exact, progress=tell)
+                else prove(problem, edition=edition or own, exact=exact, progress=tell)
             )
     except (NoCertificate, Unproved) as error:
         return fail(error, "not proved", "nothing is proved" if continuum else "no certificate")

@@ -34,7 +34,8 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
             ax.semilogy(steps, line, "--", color="#D55E00", label=f"observed rate {rate.value:.4g}")
         for row in bounds:
             if row.factor is not None and shown.any():
-                line = history[shown][0] * row.factor.value**steps
+                least = 1.0 if row.norm is None else row.norm.condition**-0.5
+                line = history[shown][0] / least * row.factor.value**steps
                 bound = BOUNDS[row.name]
                 ax.semilogy(steps, line, linestyle=bound.dashes, color=bound.colour, label=f"{row.name} bound")
         if run.last.scale > 0:

@@ -17,6 +17,8 @@ from scipy.optimize import minimize_scalar
 
 from fem1d2d.mesh import Floats
 from ndtheory.continuum.circle import disk
+from verification.algorithm.affine_piece import Piece
+from verification.algorithm.rates import ForceNorm
 from verification.constants import Measured
 from verification.free_norm.circle import Circle, Circles
 from verification.interface.pair import ContactPair
@@ -56,18 +58,14 @@ class Proved:
     ----------
     theta, factor : float
         Checked: the form is positive definite, rounding included.
-    Q : array, shape (N, N)
-        ``|g|_Q^2 = g' Q g``, never below the norm (5.21).
-    condition : float
-        The largest ``|g|_Q^2/|||g|||^2``, the least being 1.
+    norm : ForceNorm
     multipliers : tuple of arrays
         As :class:`verification.semidefinite.multipliers.Certified` has them.
     """
 
     theta: float
     factor: float
-    Q: Floats
-    condition: float
+    norm: ForceNorm
     multipliers: Weights
 
 
@@ -84,13 +82,14 @@ class FreeNorm:
     """
 
     def __init__(self, pair: ContactPair, measured: Measured, *, friction: float | None = None) -> None:
-        self.pair, self.forms = pair, QuadraticForms(pair, measured, friction=friction)
+        self.pair = pair if friction is None else pair.at(friction=friction)
+        self.forms = QuadraticForms(pair, measured, friction=friction)
         self._circles = Circles(self.forms)
 
     @one_thread()
     def factor(self, theta: float, near: float = NEAR) -> Proved | None:
         """The least factor of T_theta in any norm that is found, 0 < theta < 1; None where none below 1 is."""
-        low, high = max(self._stuck(theta), 1 - theta), 1.0
+        low, high = max(largest_radius(self.pair, theta)[0], 1 - theta), 1.0
         low += LEAST * (1 - low)
         with suppress(LMIError):
             high = min(self.forms.factor(theta).value, 1.0)
@@ -126,12 +125,6 @@ class FreeNorm:
         found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": THETA})
         return self.factor(round(float(found.x), 3))
 
-    def _stuck(self, theta: float) -> float:
-        """The largest spectral radius of two pieces of T_theta, which no norm beats."""
-        search = factor_search(self.pair, theta)
-        radii = (radius(search.found(*pattern).piece.relaxed(theta)) for pattern in search.extremes())
-        return max(radii) if self.forms.k == float(self.pair.friction) else 0.0
-
     def _proved(self, theta: float, border: tuple[float, Circle | None] | None, high: float) -> Proved | None:
         if border is None:
             border = high, self._circles.find(disk(theta, high))
@@ -152,18 +145,16 @@ class FreeNorm:
         Q = back.T @ norm @ back
         Q = (Q + Q.T) / 2
         holds = self.forms.traces.in_norm(Q, multipliers, step=(theta, 1 - theta))
-        condition = float(np.linalg.cond(norm))
+        norm_of_forces = ForceNorm(matrix=Q, condition=float(np.linalg.cond(norm)))
         if q == 1:
             proved = holds(1.0)
-            return (
-                Proved(theta=theta, factor=1.0, Q=Q, condition=condition, multipliers=multipliers) if proved else None
-            )
+            return Proved(theta=theta, factor=1.0, norm=norm_of_forces, multipliers=multipliers) if proved else None
         square = self._least_square(theta, norm, multipliers)
         safe = None if square is None else on_the_safe_side(square, holds)
         if safe is None or not safe < 1:
             return None
         factor = math.nextafter(math.sqrt(safe), math.inf)
-        return Proved(theta=theta, factor=factor, Q=Q, condition=condition, multipliers=multipliers)
+        return Proved(theta=theta, factor=factor, norm=norm_of_forces, multipliers=multipliers)
 
     def _least_square(self, theta: float, norm: Floats, multipliers: Weights) -> float | None:
         """The least q^2 for which the form is positive semidefinite in doubles; None where there is none."""
@@ -175,6 +166,13 @@ class FreeNorm:
         except np.linalg.LinAlgError:
             return None
         return float(eigvalsh(taken[:N, :N] + taken[:N, N:] @ inner, norm)[-1])
+
+
+def largest_radius(pair: ContactPair, theta: float) -> tuple[float, Piece]:
+    """The larger spectral radius of two pieces of T_theta, which no norm beats, and the piece."""
+    search = factor_search(pair, theta)
+    pieces = [search.found(*pattern).piece for pattern in search.extremes()]
+    return max(((radius(piece.relaxed(theta)), piece) for piece in pieces), key=lambda found: found[0])
 
 
 def radius(J: Floats) -> float:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from ndtheory import Number
 from ndtheory.constants import relaxation_factor
-from ndtheory.number import Numeric, below
-from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, trace
+from ndtheory.number import Numeric
+from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, rest_of, trace
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
 from verification.semidefinite import LARGEST
@@ -54,7 +52,7 @@ class SemidefiniteBound(Bound):
             proved=True,
             theta=theta,
             factor=factor,
-            one_minus_factor=None if factor is None else _rest(factor),
+            one_minus_factor=None if factor is None else rest_of(factor),
             interval=None if largest is None else (0.0, largest.value if largest.lo is None else largest.lo),
             interval_level="float" if largest is None else largest.level,
             friction=Thresholds(every=allowed, on=on),
@@ -100,14 +98,6 @@ class SemidefiniteBound(Bound):
         except (LMIError, ValueError) as error:
             raise NotComputed(str(error)) from None
         return Region(k=k, theta=theta, every=last, some=last)
-
-
-def _rest(factor: Number) -> Number:
-    """1 minus a factor."""
-    if factor.hi is None:
-        return Number.of_float(1 - factor.value)
-    least = below(1 - Fraction(factor.hi))
-    return Number(value=max(1 - factor.value, least), lo=least, level=factor.level)
 
 
 BOUNDS.provide(SemidefiniteBound())

@@ -101,7 +101,7 @@ class Conditions:
         constants = measured.energy_constants()
         if constants is None:
             raise ValueError("the theorem in energy norms does not apply to it: " + measured.why_no_energy)
-        self._measured, self.lifts = measured, pair.contact.lifts
+        self.measured, self.lifts = measured, pair.contact.lifts
         self.energy_bounds = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
         carries = slice(0, contact.size) if k else contact.normal  # without friction p_T = 0
@@ -292,7 +292,7 @@ class Conditions:
         """``lambda = tau = weight``, and a, b with ``4 a b = tau^2`` that are best at the ratio ``X = |d_1|/|d_2|``."""
         values = [weight]
         if len(self.families) > 1:
-            C_s, C_t1, C_t2 = (n.value for n in self._measured.of_friction)
+            C_s, C_t1, C_t2 = (n.value for n in self.measured.of_friction)
             alpha = (C_t1 * X + C_t2) / C_s
             values = [weight, weight, weight * alpha / 2, weight / (2 * alpha)]
         return tuple(np.full(len(a), value) for value, (a, _) in zip(values, self.families, strict=False))

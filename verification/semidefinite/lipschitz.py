@@ -24,6 +24,7 @@ from ndtheory import Number
 from ndtheory.keys import Part, key, says
 from ndtheory.number import above, below
 from verification.algorithm.affine_piece import Piece
+from verification.algorithm.rates import ForceNorm
 from verification.certificate.claims import Confirmation, NoCertificate
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
@@ -68,18 +69,20 @@ NOT_CERTIFIED = "checked in doubles with a bound on their rounding, for the inte
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Enclosure:
-    """Bounds of the Lipschitz constant of T_theta in the norm (5.21), over all loads and gaps.
+    """Bounds of the Lipschitz constant of T_theta in the norm (5.21), or in another one, over all loads and gaps.
 
     Attributes
     ----------
     upper, whole : Certified
         Proved by multipliers for every set of pieces, and by one program for all pieces together.
     lower, piece : float, Piece
-        The largest ``|J|`` found, and its piece.
+        The largest ``|J|`` found, and its piece; its spectral radius in another norm.
     tree : Leaf or Division
         The sets of pieces into which all were divided, with the proof of each.
     programs : int
         Number of programs that were solved.
+    norm : ForceNorm or None
+        None for (5.21).
     """
 
     upper: Certified
@@ -88,6 +91,7 @@ class Enclosure:
     lower: float
     piece: Piece
     programs: int
+    norm: ForceNorm | None = None
 
     @property
     def gap(self) -> float:
