@@ -249,6 +249,8 @@ class Bound(ABC):
         True if its numbers depend on the unit of stress, which is then shown beside them.
     apart : bool
         True if the document of a comparison has it under its name, not among ``bounds.editions``.
+    repeats : float
+        How closely its factor repeats for the same bodies in other units or for their mirror image.
     on_request : bool
         True if it is worked out only where its name is given.
     certifies : bool
@@ -270,6 +272,7 @@ class Bound(ABC):
     attained: ClassVar[bool] = False
     of_unit: ClassVar[bool] = False
     apart: ClassVar[bool] = False
+    repeats: ClassVar[float] = 1e-8
     on_request: ClassVar[bool] = False
     certifies: ClassVar[bool] = False
     divides: ClassVar[bool] = False

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Number
 from ndtheory.constants import relaxation_factor
 from ndtheory.keys import Part, key
-from ndtheory.number import Numeric
+from ndtheory.number import Numeric, above
 from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, rest_of, trace
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
 from verification.semidefinite import LARGEST
 
 if TYPE_CHECKING:
+    from verification.algorithm.rates import ForceNorm
     from verification.constants import Measured
+    from verification.free_norm.norm import Proved
     from verification.interface.pair import ContactPair
     from verification.semidefinite.lipschitz import Enclosure
     from verification.semidefinite.multipliers import QuadraticForms
@@ -42,7 +46,7 @@ class FreeNormOfPair(Part):
     )
     radius: float = key("the largest spectral radius found of a piece of $T_\\theta$: no norm has a smaller factor")
     theta_best: float | None = key(
-        "the theta of the least factor, to 0.01", null="where no theta is found to contract", **_none
+        "the theta of the least factor, to 0.02", null="where no theta is found to contract", **_none
     )
     factor_best: Number | None = key("there", null="where no theta is found to contract", **_none)
     theta_max: Number | None = key(
@@ -54,6 +58,9 @@ class FreeNormOfPair(Part):
         why="no friction was found, or there is no law of friction",
         default=None,
     )
+    unverified: Mapping[str, str] | None = key(
+        "why one of these is not proved for the rational data", absent="without `--verified`", default=None
+    )
     why: str = ""
 
 
@@ -62,7 +69,7 @@ class FreeNormBound(Bound):
 
     name, words = "lyapunov", "the free norm"
     colour, dashes, fill = "#7A2E8C", (0, (3, 1, 1, 1)), "#E3C8EA"
-    calculated = False
+    calculated, repeats = False, 5e-3
     apart = on_request = certifies = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
@@ -71,43 +78,27 @@ class FreeNormBound(Bound):
             return self.absent("needed a pair of bodies and a theta")
         if pair.contact.grid.n > LARGEST:
             return self.absent(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
-        from verification.free_norm.norm import FreeNorm, largest_radius
         from verification.semidefinite.interior_point import LMIError
 
-        step = float(relaxation_factor(theta))
+        chosen = relaxation_factor(theta)
         try:
-            progress("free norm: factor of one step", None)
-            free = FreeNorm(pair, measured)
-            proof, largest = free.factor(step), free.largest_theta()
-            progress("free norm: best theta", None)
-            best = None if largest is None else free.best_theta(largest.theta)
-            allowed = _friction(subject, progress)
+            found = _work_out(subject, Fraction(chosen), progress)
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
-        why = "" if proof else NO_NORM.format(step)
-        number = lambda value: None if value is None else Number.of_float(value)
-        factor = number(proof and proof.factor)
-        detail = FreeNormOfPair(
-            factor=factor,
-            condition=None if proof is None else proof.norm.condition,
-            radius=largest_radius(pair, step)[0],
-            theta_best=None if best is None else best.theta,
-            factor_best=number(best and best.factor),
-            theta_max=number(largest and largest.theta),
-            friction_threshold=allowed,
-            why=why or "no theta is found to contract",
-        )
-        on = "k" if allowed is not None or measured.C_t1 is None else "any"
+        detail, norm = found
+        on = "k" if detail.friction_threshold is not None or measured.C_t1 is None else "any"
+        largest = detail.theta_max
         return BoundResult(
             name=self.name,
             proved=True,
-            theta=step,
-            factor=factor,
-            one_minus_factor=None if factor is None else rest_of(factor),
-            norm=None if proof is None else proof.norm,
-            interval=None if largest is None else (0.0, largest.theta),
-            friction=Thresholds(every=allowed, some=allowed, on=on),
-            why=why,
+            theta=float(chosen),
+            factor=detail.factor,
+            one_minus_factor=None if detail.factor is None else rest_of(detail.factor),
+            norm=norm,
+            interval=None if largest is None else (0.0, largest.value),
+            interval_level="float" if largest is None else largest.level,
+            friction=Thresholds(every=detail.friction_threshold, some=detail.friction_threshold, on=on),
+            why="" if detail.factor is not None else detail.why,
             detail=detail,
         )
 
@@ -157,10 +148,10 @@ class FreeNormBound(Bound):
             allowed = _friction(subject, progress)
             if allowed is None:
                 raise NotComputed("no friction is found at which small thetas contract")
-            k, theta = trace(interval, allowed.value, TRACED)
+            k, theta = trace(interval, allowed[0], TRACED)
         except (LMIError, ValueError) as error:
             raise NotComputed(str(error)) from None
-        return Region(k=k, theta=theta, every=allowed.value, some=allowed.value)
+        return Region(k=k, theta=theta, every=allowed[0], some=allowed[0])
 
     def objects(self, result: BoundResult, measured: Measured, verdict: str) -> dict[str, Any]:
         """Its document with the verdict of the run on it, where it was asked for."""
@@ -168,8 +159,83 @@ class FreeNormBound(Bound):
         return {} if found is None else {self.name: found | {"verdict": verdict}}
 
 
-def _friction(subject: Subject, progress: Progress) -> Number | None:
-    """The friction below which every small theta contracts; None where none is found, or friction has no law."""
+def _work_out(subject: Subject, theta: Fraction, progress: Progress) -> tuple[FreeNormOfPair, ForceNorm | None]:
+    """The numbers for a pair, proved for its rational data where the constants were, and the norm of its factor."""
+    from verification.free_norm.norm import FreeNorm, largest_radius
+
+    pair, measured = subject.pair, subject.measured
+    assert pair is not None
+    assert measured is not None
+    progress("free norm: factor of one step", None)
+    free = FreeNorm(pair, measured)
+    proof, largest = free.factor(float(theta)), free.largest_theta()
+    progress("free norm: best theta", None)
+    best = None if largest is None else free.best_theta(largest.theta)
+    allowed = _friction(subject, progress)
+    number: dict[str, Number | None] = {
+        "factor": None if proof is None else Number.of_float(proof.factor),
+        "factor_best": None if best is None else Number.of_float(best.factor),
+        "theta_max": None if largest is None else Number.of_float(largest.theta),
+        "friction_threshold": None if allowed is None else Number.of_float(allowed[0]),
+    }
+    unverified: dict[str, str] | None = None
+    if measured.unverified is not None:  # proofs were asked for
+        exact = None if best is None else Fraction(str(best.theta))
+        proofs = {"factor": (theta, proof), "factor_best": (exact, best), "theta_max": (None, largest)}
+        number, unverified = _verified(pair, number, proofs, allowed, progress)
+    return FreeNormOfPair(
+        **number,
+        condition=None if proof is None else proof.norm.condition,
+        radius=largest_radius(pair, float(theta))[0],
+        theta_best=None if best is None else best.theta,
+        why=NO_NORM.format(float(theta)) if proof is None else "no theta is found to contract",
+        unverified=unverified,
+    ), None if proof is None else proof.norm
+
+
+def _verified(
+    pair: ContactPair,
+    numbers: Mapping[str, Number | None],
+    proofs: Mapping[str, tuple[Fraction | None, Proved | None]],
+    allowed: tuple[float, Proved] | None,
+    progress: Progress,
+) -> tuple[dict[str, Number | None], dict[str, str]]:
+    """The numbers that are proved for the rational data, the others as they were, and why these are not proved.
+
+    Proofs are of a factor at a theta, or of all thetas up to their own.
+    """
+    from verification.certificate.claims import Confirmation, NoCertificate, written_norm
+
+    found, why = dict(numbers), dict[str, str]()
+    try:
+        confirmation = Confirmation(pair, progress=progress)
+    except NoCertificate as error:
+        return found, {name: str(error) for name, number in numbers.items() if number is not None}
+    norm = lambda proof: written_norm(proof.norm, pair.neumann)
+    for name, (theta, proof) in proofs.items():
+        if proof is None:
+            continue
+        try:
+            if theta is None:
+                confirmation.contracts(proof.theta, proof.multipliers, norm(proof))
+                found[name] = Number(value=proof.theta, lo=proof.theta, level="verified")
+            else:
+                most = above(confirmation.factor(theta, proof.factor, proof.multipliers, norm(proof)))
+                found[name] = Number(value=min(proof.factor, most), hi=most, level="verified")
+        except NoCertificate as error:
+            why[name] = str(error)
+    if allowed is not None:
+        k, proof = allowed
+        try:
+            confirmation.contracts(proof.theta, proof.multipliers, norm(proof), k)
+            found["friction_threshold"] = Number(value=k, lo=k, level="verified")
+        except NoCertificate as error:
+            why["friction_threshold"] = str(error)
+    return found, why
+
+
+def _friction(subject: Subject, progress: Progress) -> tuple[float, Proved] | None:
+    """The friction up to which every small theta contracts; None where none is found, or friction has no law."""
     from verification.free_norm.norm import friction_threshold
     from verification.semidefinite.interior_point import LMIError
 
@@ -177,7 +243,7 @@ def _friction(subject: Subject, progress: Progress) -> Number | None:
     if pair is None or measured is None or measured.friction_threshold is None:
         return None
     try:
-        return Number.of_float(friction_threshold(pair, measured, measured.friction_threshold.value, progress=progress))
+        return friction_threshold(pair, measured, measured.friction_threshold.value, progress=progress)
     except LMIError:
         return None
 

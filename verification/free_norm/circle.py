@@ -25,7 +25,7 @@ from scipy.linalg import eigvalsh, solve_discrete_are
 
 from fem1d2d.mesh import Floats
 from verification.semidefinite.conditions import times
-from verification.semidefinite.interior_point import LMIError, Program, Stop, Weights, solve
+from verification.semidefinite.interior_point import Indices, LMIError, Program, Stop, Weights, solve
 from verification.semidefinite.multipliers import QuadraticForms
 
 #: Points of a half circle at which M is looked at; those that a program begins with, and the most that it has.
@@ -35,10 +35,16 @@ LOOKS, KEPT, MOST = 17, 3, 6
 BETWEEN = 0.2
 
 #: A program ends once its value is known up to this share; one below NOTHING is 0.
-STOP, NOTHING = Stop(accuracy=1e-3), 1e-7
+STOP, NOTHING = Stop(accuracy=1e-2), 1e-6
 
 #: The multipliers with which a program begins, times known ones, and tau beside a and b; lambda is at most 1.
 START, INSIDE = 0.5, 0.9
+
+#: Q is above 1 by this.
+ABOVE = 1e-6
+
+#: Rows shorter than this beside the longest one of their kind are 0.
+ROUNDING = 1e-11
 
 #: Shares of what M leaves that are taken away before Q is sought: the more, the better its condition.
 SHARES = (0.5, 0.1, 0.01)
@@ -87,7 +93,9 @@ class Circles:
         start[whole.cones[:, 0]] *= INSIDE
         tie = np.eye(len(whole.y)) if whole.tie is None else whole.tie
         self._program = replace(whole, y=start, most=most, tie=np.vstack([tie, tie]), stop=STOP)
-        rows = whole.left, whole.right
+        t, count = len(whole.cones), len(whole.left)
+        kinds = np.array([0, count - 3 * t, count - 2 * t, count - t] if t else [0])
+        rows = [_reached(each, kinds) for each in (whole.left, whole.right)]
         self._parts = [[(r[:, :N] @ self._back @ basis, r[:, N:] @ basis) for r in rows] for basis in bases]
 
     def find(self, ends: Ends) -> Circle | None:
@@ -110,7 +118,7 @@ class Circles:
     def norm(self, theta: float, q: float, circle: Circle) -> tuple[Floats, Weights] | None:
         """Q in coordinates in which (5.21) is Euclidean, and multipliers node by node, from a circle of theta and q.
 
-        Q is at least 1.  None where the equation has no solution in doubles.
+        Q is above 1.  None where the equation has no solution in doubles.
         """
         N, back = self.forms.size, self._back
         of_g = 1 / (1 + (circle.largest * np.linalg.norm(back, 2)) ** 2)
@@ -124,7 +132,7 @@ class Circles:
                 found = -solve_discrete_are(still, theta / q * back, F[:N, :N], F[N:, N:], s=F[:N, N:])
             except np.linalg.LinAlgError:
                 continue
-            least = float(eigvalsh(found)[0])
+            least = float(eigvalsh(found)[0]) * (1 - ABOVE)
             if least > 0:
                 return np.asarray(found + found.T) / (2 * least), times(1 / least, multipliers)
         return None
@@ -173,6 +181,16 @@ def _point(ends: Ends, u: float) -> complex:
     """The point h of the upper half of a circle whose real part divides its ends as u does."""
     low, high = ends
     return complex(low + u * (high - low), (high - low) * np.sqrt(u * (1 - u)))
+
+
+def _reached(rows: Floats, kinds: Indices) -> Floats:
+    """Rows, but 0 for those that only rounding keeps from it, as of a node at the end of a kernel.
+
+    ``kinds`` are the first rows of each kind.
+    """
+    lengths = np.linalg.norm(rows, axis=1)
+    longest = np.repeat(np.maximum.reduceat(lengths, kinds), np.diff([*kinds, len(rows)]))
+    return np.asarray(np.where(lengths > ROUNDING * longest, 1.0, 0.0)[:, None] * rows)
 
 
 def _real(rows: Complex) -> Floats:

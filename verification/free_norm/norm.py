@@ -47,7 +47,7 @@ SMALL = 0.01
 LEAST = 1e-3
 
 #: How closely the best theta is sought, and the factors of those beside it.
-THETA, ROUGH = 1e-2, 1e-2
+THETA, ROUGH = 2e-2, 1e-2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -180,8 +180,10 @@ def radius(J: Floats) -> float:
     return float(np.abs(np.linalg.eigvals(J)).max())
 
 
-def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, progress: Progress = silent) -> float:
-    """A friction below which every small theta contracts in a free norm, close to the largest that is found.
+def friction_threshold(
+    pair: ContactPair, measured: Measured, start: float, *, progress: Progress = silent
+) -> tuple[float, Proved]:
+    """A friction up to which every small theta contracts in a free norm, close to the largest found, and the proof.
 
     ``start`` is a friction to begin with, as that of the theorem in energy norms.
 
@@ -204,8 +206,8 @@ def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, p
     border = _border(at, low, high, NEAR_FRICTION)
     for share in INSIDE:
         k = (low if border is None else border[0]) * (1 - share)
-        if k and FreeNorm(pair, measured, friction=k).every_small_theta() is not None:
-            return k
+        if k and (proof := FreeNorm(pair, measured, friction=k).every_small_theta()) is not None:
+            return k, proof
     raise LMIError("no friction is found at which small thetas contract")
 
 

@@ -25,7 +25,7 @@ class SemidefiniteBound(Bound):
 
     name, words = "lmi", "the semidefinite bound"
     colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
-    calculated = False
+    calculated, repeats = False, 1e-4
     attained = True  # without friction
     apart = certifies = divides = True
 

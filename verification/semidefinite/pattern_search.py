@@ -11,6 +11,7 @@ nodes slide the other way.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -22,6 +23,7 @@ from scipy.linalg.lapack import dpotrf
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
+from verification.algorithm.rates import ForceNorm
 from verification.contact.active_set import Pattern
 from verification.interface.pair import ContactPair
 from verification.machine.threads import one_thread
@@ -220,22 +222,26 @@ def _from_starts(search: Search, *, random: np.random.Generator, starts: int) ->
         return max((search.climb(search.found(*pattern)) for pattern in patterns[:starts]), key=lambda best: best.value)
 
 
-def factor_search(pair: ContactPair, theta: float) -> Search:
-    """The search for the largest ``|J|^2`` of T_theta in the norm (5.21)."""
+def factor_search(pair: ContactPair, theta: float, norm: ForceNorm | None = None) -> Search:
+    """The search for the largest ``|J|^2`` of T_theta in the norm (5.21), or in another one."""
+    gram = pair.neumann.inverse if norm is None else norm.matrix
 
     def factors(found: Responses) -> tuple[Floats, Floats]:
-        return squared(theta * found.force + (1 - theta) * found.g, pair.neumann.inverse)
+        return squared(theta * found.force + (1 - theta) * found.g, gram)
 
-    return Search(pair, factors)
+    root = pair.neumann.root
+    return Search(pair, factors, against=None if norm is None else root.T @ gram @ root)
 
 
-def largest_factor(pair: ContactPair, theta: float, *, random: np.random.Generator, starts: int = 4) -> FoundFactor:
-    """The largest ``|J|`` of T_theta over contact patterns, in the norm (5.21): attained by two forces."""
-    search = factor_search(pair, theta)
+def largest_factor(
+    pair: ContactPair, theta: float, *, random: np.random.Generator, starts: int = 4, norm: ForceNorm | None = None
+) -> FoundFactor:
+    """The largest ``|J|`` of T_theta over contact patterns, in the norm (5.21) or another: attained by two forces."""
+    search = factor_search(pair, theta, norm)
     found = _from_starts(search, random=random, starts=starts)
     with one_thread():
         found = search.climb(found, side_by_side=True)
-    return replace(found, value=found.piece.factor(theta))
+    return replace(found, value=found.piece.factor(theta) if norm is None else math.sqrt(max(found.value, 0.0)))
 
 
 def _several(pattern: Pattern, patterns: Patterns, node: NDArray[np.intp], helps: NDArray[np.intp]) -> Patterns:
