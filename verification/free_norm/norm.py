@@ -20,10 +20,11 @@ from ndtheory.continuum.circle import disk
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import ForceNorm
 from verification.constants import Measured
-from verification.free_norm.circle import Circle, Circles
+from verification.free_norm.circle import ABOVE, Circle, Circles
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
+from verification.semidefinite.conditions import times
 from verification.semidefinite.interior_point import LMIError, Weights
 from verification.semidefinite.multipliers import QuadraticForms, on_the_safe_side
 from verification.semidefinite.pattern_search import factor_search
@@ -42,6 +43,9 @@ LARGEST = 2**12
 
 #: The theta that stands for every small one: smaller ones contract as well.
 SMALL = 0.01
+
+#: Next to 0 and to 1 a factor is known up to NEAR times this share of theta.
+COARSE = 0.05
 
 #: The least circle beside 1 - theta that is tried.
 LEAST = 1e-3
@@ -91,29 +95,35 @@ class FreeNorm:
         """The least factor of T_theta in any norm that is found, 0 < theta < 1; None where none below 1 is."""
         low, high = max(largest_radius(self.pair, theta)[0], 1 - theta), 1.0
         low += LEAST * (1 - low)
+        energy = None
         with suppress(LMIError):
-            high = min(self.forms.factor(theta).value, 1.0)
+            energy = self.forms.factor(theta)
+            high = min(energy.value, 1.0)
         high = high if low < high else 1.0
-        return self._proved(theta, _border(lambda q: self._circles.find(disk(theta, q)), high, low, near), high)
+        at = lambda q: self._circles.find(disk(theta, q))
+        border = _border(at, high, low, lambda q: near * max(min(q, 1 - q), COARSE * theta)) or (high, at(high))
+        found = next(filter(None, (self._inside(theta, border, share, at) for share in INSIDE)), None)
+        if energy is not None and energy.value < 1 and (found is None or energy.value <= (1 + near) * found.factor):
+            size = 1 + ABOVE  # nothing is gained, as without friction
+            return self._proof(theta, size * np.eye(self.forms.size), times(size, energy.multipliers)) or found
+        return found
 
     @one_thread()
     def largest_theta(self) -> Proved | None:
         """A theta up to which every one contracts, as large as is found: with 1 as its factor; None without one."""
         at = lambda theta: self._circles.find(disk(theta, 1.0))
         found = at(1.0)
-        border = (1.0, found) if found is not None else _border(at, 0.0, 1.0, NEAR)
-        for share in INSIDE:
-            if border is None or border[1] is None:
-                return None
-            theta = border[0] * (1 - share)
-            if (proof := self._checked(theta, 1.0, border[1] if not share else at(theta))) is not None:
-                return proof
-        return None
+        border = (1.0, found) if found is not None else _border(at, 0.0, 1.0, lambda theta: NEAR * theta)
+        if border is None:
+            return None
+        thetas = (border[0] * (1 - share) for share in INSIDE)
+        proofs = (self._at_most_one(theta, border[1] if theta == border[0] else at(theta)) for theta in thetas)
+        return next(filter(None, proofs), None)
 
     def every_small_theta(self) -> Proved | None:
         """The proof that every theta up to SMALL contracts; None where none is found."""
         with one_thread():
-            return self._checked(SMALL, 1.0, self._circles.find(disk(SMALL, 1.0)))
+            return self._at_most_one(SMALL, self._circles.find(disk(SMALL, 1.0)))
 
     def best_theta(self, largest: float) -> Proved | None:
         """The proof for the theta whose factor is least, below the largest one that contracts."""
@@ -125,36 +135,39 @@ class FreeNorm:
         found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": THETA})
         return self.factor(round(float(found.x), 3))
 
-    def _proved(self, theta: float, border: tuple[float, Circle | None] | None, high: float) -> Proved | None:
-        if border is None:
-            border = high, self._circles.find(disk(theta, high))
-        for share in INSIDE:
-            q = border[0] * (1 + share)
-            circle = border[1] if not share else self._circles.find(disk(theta, q))
-            if q <= 1 and (proof := self._checked(theta, q, circle)) is not None:
-                return proof
-        return None
-
-    def _checked(self, theta: float, q: float, circle: Circle | None) -> Proved | None:
-        """The proof by the multipliers of a circle, its factor as small as they allow but for q = 1."""
+    def _inside(
+        self, theta: float, border: tuple[float, Circle | None], share: float, at: Callable[[float], Circle | None]
+    ) -> Proved | None:
+        """The proof of a factor further from 0 than its border by a share of what is left to 1."""
+        q = border[0] + share * (1 - border[0])
+        circle = at(q) if share else border[1]
         found = None if circle is None else self._circles.norm(theta, q, circle)
-        if found is None:
-            return None
-        norm, multipliers = found
+        return None if found is None else self._proof(theta, *found)
+
+    def _at_most_one(self, theta: float, circle: Circle | None) -> Proved | None:
+        """The proof that no step of theta is longer, from a circle of q = 1."""
+        found = None if circle is None else self._circles.norm(theta, 1.0, circle)
+        return None if found is None else self._proof(theta, *found, factor=1.0)
+
+    def _proof(self, theta: float, norm: Floats, multipliers: Weights, factor: float | None = None) -> Proved | None:
+        """The proof by a norm, in coordinates in which (5.21) is Euclidean, and its multipliers.
+
+        Of a factor, or of the least one below 1 by default.
+        """
         back = solve_triangular(self.pair.neumann.root, np.eye(len(norm)), lower=True)
         Q = back.T @ norm @ back
         Q = (Q + Q.T) / 2
         holds = self.forms.traces.in_norm(Q, multipliers, step=(theta, 1 - theta))
-        norm_of_forces = ForceNorm(matrix=Q, condition=float(np.linalg.cond(norm)))
-        if q == 1:
-            proved = holds(1.0)
-            return Proved(theta=theta, factor=1.0, norm=norm_of_forces, multipliers=multipliers) if proved else None
-        square = self._least_square(theta, norm, multipliers)
-        safe = None if square is None else on_the_safe_side(square, holds)
-        if safe is None or not safe < 1:
+        if factor is None:
+            square = self._least_square(theta, norm, multipliers)
+            safe = None if square is None else on_the_safe_side(square, holds)
+            if safe is None or not safe < 1:
+                return None
+            factor = math.nextafter(math.sqrt(safe), math.inf)
+        elif not holds(factor**2):
             return None
-        factor = math.nextafter(math.sqrt(safe), math.inf)
-        return Proved(theta=theta, factor=factor, norm=norm_of_forces, multipliers=multipliers)
+        of_forces = ForceNorm(matrix=Q, condition=float(np.linalg.cond(norm)))
+        return Proved(theta=theta, factor=factor, norm=of_forces, multipliers=multipliers)
 
     def _least_square(self, theta: float, norm: Floats, multipliers: Weights) -> float | None:
         """The least q^2 for which the form is positive semidefinite in doubles; None where there is none."""
@@ -203,7 +216,7 @@ def friction_threshold(
         low, high = high, 2 * high
         if high > LARGEST * start:
             raise LMIError(f"no friction up to {low:.3g} is found at which small thetas do not contract")
-    border = _border(at, low, high, NEAR_FRICTION)
+    border = _border(at, low, high, lambda k: NEAR_FRICTION * k)
     for share in INSIDE:
         k = (low if border is None else border[0]) * (1 - share)
         if k and (proof := FreeNorm(pair, measured, friction=k).every_small_theta()) is not None:
@@ -212,16 +225,16 @@ def friction_threshold(
 
 
 def _border(
-    at: Callable[[float], Circle | None], inside: float, outside: float, near: float
-) -> tuple[float, Circle | None] | None:
+    at: Callable[[float], Circle | None], inside: float, outside: float, near: Callable[[float], float]
+) -> tuple[float, Circle] | None:
     """The value nearest to the border of where something is found, between one inside and one outside.
 
-    Close to the border margins grow like the square of the distance, so their roots point to it.  None where nothing
-    is found but ``inside``, at which nothing is looked for.
+    Close to the border margins grow like the square of the distance, so their roots point to it.  ``near`` is how
+    closely it must be known at a value.  None where nothing is found but ``inside``, at which nothing is looked for.
     """
     best: tuple[float, Circle] | None = None
     seen: list[tuple[float, float]] = []
-    value, size = (inside + outside) / 2, max(abs(inside), abs(outside))
+    value = (inside + outside) / 2
     for _ in range(MOST):
         found = at(value)
         if found is None:
@@ -229,16 +242,14 @@ def _border(
         else:
             inside, best = value, (value, found)
             seen.append((value, math.sqrt(max(found.margin, 0.0))))
-        if best is not None:
-            size = abs(best[0])
-        width = outside - inside
-        if abs(width) <= near * size:
+        width, known = outside - inside, near(outside if best is None else inside)
+        if abs(width) <= known:
             break
         value = inside + width / 2
         if len(seen) > 1 and (slope := seen[-1][1] - seen[-2][1]):
             guess = seen[-1][0] - seen[-1][1] * (seen[-1][0] - seen[-2][0]) / slope
-            aside = math.copysign(ASIDE * near * size, width)
-            guess += -aside if abs(guess - inside) > near * size else aside
+            aside = math.copysign(ASIDE * known, width)
+            guess += -aside if abs(guess - inside) > known else aside
             if 0 < (guess - inside) / width < 1:
                 value = guess
     return best
