@@ -67,7 +67,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "__init__ calibrating check claims continuum contraction exact_bodies proved_constants sections"
         ),
     },
-    "free norm": {"verification.free_norm": "__init__ circle norm search sections two_layers"},
+    "free norm": {"verification.free_norm": "__init__ bound circle norm search sections two_layers"},
     "runs over grids": {
         "verification.sweeps": ("__init__ best_theta export grid pieces region row sections store sweep workers")
     },
@@ -116,6 +116,9 @@ INSIDE = (
     ("verification.cli", "tomllib", "one command in ten reads a file"),
     ("verification.cli.console", "rich", "only progress needs it"),
     ("verification.semidefinite.bound", "verification.semidefinite", "the calculator has bounds and no arrays"),
+    ("verification.free_norm.bound", "verification.free_norm", "the calculator has bounds and no arrays"),
+    ("verification.free_norm.bound", "verification.semidefinite", "the calculator has bounds and no arrays"),
+    ("verification.free_norm.bound", "verification.certificate", "proofs are loaded once they are asked for"),
     ("verification.ledger.rows", "verification.ledger.sources", "records are read without sympy, which takes a second"),
     ("verification.output.folder", "verification.figures", "matplotlib is loaded once there is something to draw"),
     ("verification.output.fields", "meshio", "half a second; only a folder needs it"),

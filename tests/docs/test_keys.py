@@ -337,6 +337,9 @@ def test_every_document_fits_its_schema_which_has_its_keys_and_no_other(document
         f"example --inputs {folder / 'inputs'}",
         f"sweep {folder / 'grid.toml'} --dry-run",
         f"certify {folder / 'small.toml'} --set contact.friction=5",  # no proof
+        f"certify {folder / 'small.toml'} --norm lyapunov",
+        f"compare {folder / 'small.toml'} --bounds lyapunov --verified",
+        f"compare {folder / 'small.toml'} --bounds lyapunov --set contact.friction=9",
         f"region {folder / 'small.toml'} -o {folder / 'plane.svg'}",
         f"explore {folder / 'small.toml'} -o {folder / 'page.html'}",
     ):

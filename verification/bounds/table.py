@@ -92,7 +92,7 @@ class Printed(Section5):
     """As the paper prints it: in a unit of stress in which m >= 1."""
 
     name, words, edition = "printed", "the theorem as printed", PRINTED
-    colour, dashes, fill, hatch = "#555555", ":", "#555555", "xx"
+    colour, dashes, fill, hatch = "#555555", ":", "#4A4A4A", "xx"
     finding = of_unit = True
 
     def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ class Repaired(Section5):
     """With the lost power of m put back: the same in every unit."""
 
     name, words, edition = "repaired", "the theorem repaired", REPAIRED
-    colour, dashes, fill, hatch = "#0B5A94", (0, (5, 1, 1, 1, 1, 1)), "#4A90C4", "//"
+    colour, dashes, fill, hatch = "#0B5A94", (0, (5, 1, 1, 1, 1, 1)), "#3F82B5", "//"
     certifies = True
 
 
@@ -111,7 +111,7 @@ class Energy(Calculation):
     """The same proof as Section 5, with no constant larger than it must be; see ``docs/energy.md``."""
 
     name, words = "energy", "the theorem in energy norms"
-    colour, dashes, fill, hatch = "#00724F", (0, (7, 2)), "#8FD3B6", ".."
+    colour, dashes, fill, hatch = "#00724F", (0, (7, 2)), "#70BB9A", ".."
     attained = True  # without friction
     certifies = True
 

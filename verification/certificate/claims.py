@@ -20,7 +20,7 @@ from flint import ctx
 from numpy.typing import NDArray
 
 from fem1d2d.element import lacks
-from ndtheory.keys import Part, key
+from ndtheory.keys import Part, document, key
 from verification.algorithm.rates import ForceNorm
 from verification.certificate.check import check, surface_stiffness
 from verification.certificate.exact_bodies import ExactInterface, NotExact, exact_normals, exact_points
@@ -250,11 +250,24 @@ def written(multipliers: Weights, equal: Sequence[float] = ()) -> dict[str, Any]
     return found | ({"equal": [str(_decimal(float(value))) for value in equal]} if len(equal) else {})
 
 
+@dataclass(frozen=True, kw_only=True)
+class RationalNorm(Part):
+    """A norm in rationals, as texts; normal components of forces are along y."""
+
+    part = "Norm in rationals"
+
+    matrix: list[Any] = key(
+        r"rows of the lower triangle of $Q$, $|g|^2 = g^\top Q g$", unit="length/stress", type="list of free"
+    )
+    condition: str = key(r"at most the largest $g^\top Q g$ where (5.21) is 1; at least 1 is the least", unit="1")
+
+
 def written_norm(norm: ForceNorm, neumann: Condensed) -> dict[str, Any]:
-    """A norm as the checker reads it: rationals, its normal components along y."""
+    """A norm as the checker reads it."""
     matrix = neumann.orient_form(norm.matrix)
     rows = [[str(_decimal(float(value))) for value in row[: i + 1]] for i, row in enumerate(matrix)]
-    return {"matrix": rows, "condition": str(_decimal(norm.condition * (1 + WIDER), ROUND_UP, digits=5))}
+    condition = _decimal(norm.condition * (1 + WIDER), ROUND_UP, digits=5)
+    return document(RationalNorm(matrix=rows, condition=str(condition)))
 
 
 def _allowed(bits: float) -> int:

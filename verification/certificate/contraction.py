@@ -78,16 +78,9 @@ CLAIM = {
         absent="without friction, and where the kernel is another one: $k$ varies, or grids that differ meet along a"
         " line that is not level",
     ),
-    "norm.matrix": Key(
-        says=r"rationals: rows of the lower triangle of $Q$, $|g|^2 = g' Q g$; without it the norm is (5.21)",
-        type="list of free",
-        unit="length/stress",
-        absent="for another edition than `lyapunov`",
-    ),
-    "norm.condition": Key(
-        says="rational: at most the largest $g' Q g$ where (5.21) is 1, and 1 the least",
-        type="text",
-        unit="1",
+    "norm": Key(
+        says="the norm of the claim; without it (5.21)",
+        type="Norm in rationals",
         absent="for another edition than `lyapunov`",
     ),
     "bits": Key(says="bits of the balls in which the checker decides", type="integer", unit=""),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -61,6 +61,7 @@ class FreeNormOfPair(Part):
     unverified: Mapping[str, str] | None = key(
         "why one of these is not proved for the rational data", absent="without `--verified`", default=None
     )
+    verdict: str | None = key("of the run in that norm, as in `verdicts`", absent="outside a comparison", default=None)
     why: str = ""
 
 
@@ -68,7 +69,7 @@ class FreeNormBound(Bound):
     """The least factor in any norm ``g' Q g`` that is found; see ``docs/free_norm.md``."""
 
     name, words = "lyapunov", "the free norm"
-    colour, dashes, fill = "#7A2E8C", (0, (3, 1, 1, 1)), "#E3C8EA"
+    colour, dashes, fill = "#7A2E8C", (0, (3, 1, 1, 1)), "#F6EAFA"
     calculated, repeats = False, 5e-3
     apart = on_request = certifies = True
 
@@ -155,8 +156,7 @@ class FreeNormBound(Bound):
 
     def objects(self, result: BoundResult, measured: Measured, verdict: str) -> dict[str, Any]:
         """Its document with the verdict of the run on it, where it was asked for."""
-        found = super().objects(result, measured, verdict)[self.name] if result.asked else None
-        return {} if found is None else {self.name: found | {"verdict": verdict}}
+        return {} if result.detail is None else {self.name: replace(result.detail, verdict=verdict)}
 
 
 def _work_out(subject: Subject, theta: Fraction, progress: Progress) -> tuple[FreeNormOfPair, ForceNorm | None]:
@@ -184,7 +184,10 @@ def _work_out(subject: Subject, theta: Fraction, progress: Progress) -> tuple[Fr
         proofs = {"factor": (theta, proof), "factor_best": (exact, best), "theta_max": (None, largest)}
         number, unverified = _verified(pair, number, proofs, allowed, progress)
     return FreeNormOfPair(
-        **number,
+        factor=number["factor"],
+        factor_best=number["factor_best"],
+        theta_max=number["theta_max"],
+        friction_threshold=number["friction_threshold"],
         condition=None if proof is None else proof.norm.condition,
         radius=largest_radius(pair, float(theta))[0],
         theta_best=None if best is None else best.theta,

@@ -24,7 +24,7 @@ class SemidefiniteBound(Bound):
     """The factor proved by multipliers of the conditions of step II, up to LARGEST nodes; see ``docs/energy.md``."""
 
     name, words = "lmi", "the semidefinite bound"
-    colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
+    colour, dashes, fill = "#8A5A00", "-.", "#EDC95E"
     calculated, repeats = False, 1e-4
     attained = True  # without friction
     apart = certifies = divides = True

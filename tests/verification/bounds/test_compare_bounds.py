@@ -6,6 +6,7 @@ from problem_list import small
 
 import verification as vf
 from verification import comparison
+from verification.algorithm.rates import largest_step_ratio
 from verification.bounds.bound import NOT_ASKED
 from verification.bounds.table import chosen
 from verification.registry import BOUNDS, PROOFS, Prover
@@ -15,6 +16,7 @@ pytestmark = pytest.mark.usefixtures("known_bounds")
 PROBLEM = vf.Problem.from_dict(small())
 QUICK = ("printed", "repaired", "energy")
 KNOWN = ", ".join(BOUNDS)
+BY_DEFAULT = tuple(name for name, bound in BOUNDS.items() if not bound.on_request)
 
 
 @pytest.fixture
@@ -89,13 +91,13 @@ def test_parts_are_told_again_as_they_were_told_first(bounds):
     vf.compare(PROBLEM, bounds=bounds, listener=first).tell(again)
     assert again.told == first.told
     names = [name for part, listed in first.told for name in listed]
-    assert names == list(bounds or BOUNDS)
+    assert names == list(bounds or BY_DEFAULT)
     slow = {"cvxpy", "losses", "programs"} & {part for part, _ in first.told}
     assert len(slow) == (0 if bounds == QUICK else 3)
 
 
 def test_all_names_are_no_names(worked_out):
-    assert vf.compare(PROBLEM, bounds=tuple(BOUNDS)).to_json() == vf.compare(PROBLEM).to_json()
+    assert vf.compare(PROBLEM, bounds=BY_DEFAULT).to_json() == vf.compare(PROBLEM).to_json()
 
 
 def test_outside_the_theorem_too_a_bound_that_was_not_asked_for_is_not_computed():
@@ -131,4 +133,20 @@ def test_an_unknown_name_and_none_are_refused_with_the_names_there_are(bounds, m
 
 def test_names_are_taken_in_the_order_of_the_table():
     assert chosen(["lmi", "printed", "lmi"]) == ("printed", "lmi")
-    assert chosen(None) == tuple(BOUNDS)
+    assert chosen(None) == BY_DEFAULT == ("printed", "repaired", "energy", "lmi")
+
+
+def test_a_bound_on_request_is_worked_out_judged_in_its_norm_and_written_only_then():
+    found = vf.compare(PROBLEM, bounds=["lyapunov"])
+    bound, document = found.bounds["lyapunov"], found.to_dict()
+    written = document["lyapunov"]
+    assert written["factor"]["value"] == bound.factor.value < 1
+    assert written["condition"] == bound.norm.condition > 1
+    assert written["radius"] <= written["factor"]["value"]
+    assert written["verdict"] == document["verdicts"]["lyapunov"] == "CONSISTENT"
+    assert written["factor_best"]["value"] <= written["factor"]["value"] * 1.01
+    in_its_norm = largest_step_ratio(found.run.pair, found.run.iterates, bound.norm)
+    assert f"{in_its_norm.value:.4g}" in found.verdicts["lyapunov"].reason
+    without = vf.compare(PROBLEM, bounds=["energy"])
+    assert "lyapunov" not in without.to_dict()
+    assert "lyapunov" not in without.verdicts
