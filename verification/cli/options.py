@@ -78,6 +78,24 @@ RELAXATION = click.option(
     metavar="RULE",  # a list of the names would import the rules, and arrays with them
     help="Rule of relaxation, instead of the file's; all but constant are outside the theorem. A wrong name lists all.",
 )
+
+
+def _bounds(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
+    from verification.bounds.table import chosen
+
+    try:
+        return None if value is None else chosen(value)
+    except ValueError as error:
+        raise click.BadParameter(str(error), context, parameter) from None
+
+
+BOUNDS = click.option(
+    "--bounds",
+    callback=_bounds,
+    metavar="NAMES",
+    help="Only these bounds, as printed,repaired,energy; all but lyapunov by default, and without lmi it is fast.",
+)
+
 THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, instead of the file's.")
 SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Exchange the roles of the bodies.")
 SOLVER = click.option(

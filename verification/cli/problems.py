@@ -17,7 +17,7 @@ import click
 from ndtheory.keys import key
 from verification.cli.console import complain, deliver, one_by_one, progress, remember, say, stages
 from verification.cli.forms import cli
-from verification.cli.options import FOLDER, JSON, PATH, RUN, SWAP, Typed, folder_name, of_a_file
+from verification.cli.options import BOUNDS, FOLDER, JSON, PATH, RUN, SWAP, Typed, folder_name, of_a_file
 from verification.document import Document
 
 if TYPE_CHECKING:
@@ -226,27 +226,13 @@ def solve(typed: Typed, folder: Path | None, as_json: bool) -> int:
     return 0
 
 
-def _bounds(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
-    from verification.bounds.table import chosen
-
-    try:
-        return None if value is None else chosen(value)
-    except ValueError as error:
-        raise click.BadParameter(str(error), context, parameter) from None
-
-
 @cli.command()
 @of_a_file(*RUN)
 @click.option(
     "--exact", is_flag=True, help="Tighten the semidefinite bound to within 0.1 % of a factor that some loads attain."
 )
 @click.option("--verified", is_flag=True, help="Prove constants and bounds, for the exact data of FILE on its mesh.")
-@click.option(
-    "--bounds",
-    callback=_bounds,
-    metavar="NAMES",
-    help="Only these bounds, as printed,repaired,energy: all but lmi, without which it takes little longer than a run.",
-)
+@BOUNDS
 @FOLDER
 @JSON
 def compare(
@@ -265,9 +251,9 @@ def compare(
       ndtheory compare my.toml --bounds printed,repaired,energy
     """
     if asked["exact"] and bounds is not None:
-        from verification.registry import BOUNDS
+        from verification import registry
 
-        if all(BOUNDS[name].calculated for name in bounds):
+        if all(registry.BOUNDS[name].calculated for name in bounds):
             needed = "needed a bound among them that can be brought closer"
             raise click.UsageError(f"received --exact with --bounds {','.join(bounds)}: {needed}")
     return _compare(load(typed), typed, folder, solver, as_json, bounds=bounds, **asked)

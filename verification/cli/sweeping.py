@@ -16,7 +16,7 @@ import click
 from ndtheory.texts import printable
 from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import cli
-from verification.cli.options import FILE, FOLDER, JOBS, JSON, PATH, STORE, SWAP, Typed, of_a_file, one_file
+from verification.cli.options import BOUNDS, FILE, FOLDER, JOBS, JSON, PATH, STORE, SWAP, Typed, of_a_file, one_file
 from verification.cli.problems import load, warn
 from verification.problem.tables import ProblemError, unreadable
 
@@ -240,18 +240,20 @@ def every(
 @cli.command()
 @of_a_file(SWAP)
 @one_file(".svg", ".png", words="File to draw", required=True)
+@BOUNDS
 @STORE
 @JSON
-def region(typed: Typed, target: Path, store: Path | None, as_json: bool) -> None:
+def region(typed: Typed, target: Path, bounds: tuple[str, ...] | None, store: Path | None, as_json: bool) -> None:
     """Draw over theta and k where each bound proves contraction.
 
-    The regions are those of all bounds for the bodies of FILE; points show how runs end.  Both axes are logarithmic;
+    The regions are those of the bounds for the bodies of FILE; points show how runs end.  Both axes are logarithmic;
     theta and k have no unit.
 
     \b
     Example:
       ndtheory region my.toml -o plane.svg
       ndtheory region my.toml --set body2.young=7e4 -o stiff.svg
+      ndtheory region my.toml --bounds energy,lyapunov -o plane.svg
     """
     from verification import figures
     from verification.output.files import write_into
@@ -260,7 +262,7 @@ def region(typed: Typed, target: Path, store: Path | None, as_json: bool) -> Non
 
     problem = load(typed)
     with stages() as tell:
-        plane = chart(problem, store=store, progress=tell)
+        plane = chart(problem, bounds=bounds, store=store, progress=tell)
     deliver(plane, lambda found: sections(found, target), as_json)
     with stages() as tell:
         tell("drawing", None)

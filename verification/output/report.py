@@ -23,6 +23,7 @@ GLOSSARY = {
     "energy": "The same proof in energy norms.",
     "lmi": "The bound by semidefinite programs, from the conditions of contact and friction node by node. Its "
     "quadratic form is checked in floating point.",
+    "lyapunov": "The same in a norm that the proof chooses, not in (5.21).",
     "verified, v": "The level of a number: it is proved for the exact data on this mesh, with all rounding errors "
     "bounded. A number without a mark was computed in doubles.",
     "factor": "The number by which a bound says that one step multiplies the error at most.",

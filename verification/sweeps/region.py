@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -12,6 +12,7 @@ import numpy as np
 from ndtheory.keys import Part, key
 from verification.algorithm.loop import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
+from verification.bounds.table import chosen
 from verification.constants import Measured, measure
 from verification.constants.measured import SLIDES
 from verification.contact import ContactError
@@ -66,9 +67,16 @@ class Plane(Document):
         return "points" in self.reason
 
 
-def chart(problem: Problem, *, store: Path | None = None, progress: Progress = silent) -> Plane:
-    """Trace the regions of all bounds for a problem's bodies, and run a grid of theta and k.
+def chart(
+    problem: Problem,
+    *,
+    bounds: Sequence[str] | str | None = None,
+    store: Path | None = None,
+    progress: Progress = silent,
+) -> Plane:
+    """Trace the regions of bounds for a problem's bodies, and run a grid of theta and k.
 
+    ``bounds`` are names as :func:`verification.compare` takes them, all but those on request by default.
     ``store`` is a file that keeps the runs, and has those that were made before.
 
     Raises
@@ -78,18 +86,19 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
     KeyboardInterrupt
         Before the first region was traced; later it leaves out what was still to come.
     """
+    asked = chosen(bounds)
     progress("tracing the regions", None)
     pair = pair_from(problem)
     measured = measure(pair)
     check_plane(pair, measured)
     subject = Subject.of(pair, measured)
     regions: dict[str, Region] = {}
-    reason = dict.fromkeys((*BOUNDS, "points"), INTERRUPTED)
+    reason = dict.fromkeys((*asked, "points"), INTERRUPTED)
     points: list[Point] = []
     limited = replace(pair.settings, relaxation="constant", max_iterations=MOST_STEPS)
     grid = SweepGrid.of({"theta": THETAS, "friction": FRICTIONS})
     try:
-        for bound in BOUNDS.values():
+        for bound in map(BOUNDS.__getitem__, asked):
             try:
                 regions[bound.name] = bound.region(subject, progress=progress)
                 del reason[bound.name]
