@@ -19,6 +19,7 @@ from fem1d2d.mesh import Floats
 from ndtheory.continuum.circle import disk
 from verification.constants import Measured
 from verification.free_norm.circle import Circle, Circles
+from verification.free_norm.radius import radius
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
@@ -175,11 +176,6 @@ class FreeNorm:
         except np.linalg.LinAlgError:
             return None
         return float(eigvalsh(taken[:N, :N] + taken[:N, N:] @ inner, norm)[-1])
-
-
-def radius(J: Floats) -> float:
-    """The spectral radius of a matrix."""
-    return float(np.abs(np.linalg.eigvals(J)).max())
 
 
 def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, progress: Progress = silent) -> float:
