@@ -106,7 +106,8 @@ class FreeNormBound(Bound):
     def enclose(
         self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
     ) -> Enclosure:
-        from verification.free_norm.norm import FreeNorm, largest_radius
+        from verification.free_norm.norm import FreeNorm
+        from verification.free_norm.radius import largest_radius
         from verification.semidefinite.interior_point import LMIError
         from verification.semidefinite.lipschitz import Enclosure, Leaf
         from verification.semidefinite.multipliers import Certified
@@ -117,9 +118,11 @@ class FreeNormBound(Bound):
         upper = Certified(
             value=proof.factor, evaluated=proof.factor, proposed=proof.factor, multipliers=proof.multipliers
         )
-        everywhere, (lower, piece) = forms.everywhere, largest_radius(pair, theta)
+        everywhere, worst = forms.everywhere, largest_radius(pair, theta)
         tree = Leaf(pieces=everywhere, upper=upper, proved_on=everywhere, proposal=None)
-        return Enclosure(upper=upper, whole=upper, tree=tree, lower=lower, piece=piece, programs=0, norm=proof.norm)
+        return Enclosure(
+            upper=upper, whole=upper, tree=tree, lower=worst.value, piece=worst.pieces[0], programs=0, norm=proof.norm
+        )
 
     def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
         found = None if result is None else result.detail
@@ -161,7 +164,8 @@ class FreeNormBound(Bound):
 
 def _work_out(subject: Subject, theta: Fraction, progress: Progress) -> tuple[FreeNormOfPair, ForceNorm | None]:
     """The numbers for a pair, proved for its rational data where the constants were, and the norm of its factor."""
-    from verification.free_norm.norm import FreeNorm, largest_radius
+    from verification.free_norm.norm import FreeNorm
+    from verification.free_norm.radius import largest_radius
 
     pair, measured = subject.pair, subject.measured
     assert pair is not None
@@ -189,7 +193,7 @@ def _work_out(subject: Subject, theta: Fraction, progress: Progress) -> tuple[Fr
         theta_max=number["theta_max"],
         friction_threshold=number["friction_threshold"],
         condition=None if proof is None else proof.norm.condition,
-        radius=largest_radius(pair, float(theta))[0],
+        radius=largest_radius(pair, float(theta)).value,
         theta_best=None if best is None else best.theta,
         why=NO_NORM.format(float(theta)) if proof is None else "no theta is found to contract",
         unverified=unverified,

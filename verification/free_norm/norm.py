@@ -17,10 +17,10 @@ from scipy.optimize import minimize_scalar
 
 from fem1d2d.mesh import Floats
 from ndtheory.continuum.circle import disk
-from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import ForceNorm
 from verification.constants import Measured
 from verification.free_norm.circle import ABOVE, Circle, Circles
+from verification.free_norm.radius import radius
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
@@ -93,7 +93,9 @@ class FreeNorm:
     @one_thread()
     def factor(self, theta: float, near: float = NEAR) -> Proved | None:
         """The least factor of T_theta in any norm that is found, 0 < theta < 1; None where none below 1 is."""
-        low, high = max(largest_radius(self.pair, theta)[0], 1 - theta), 1.0
+        search = factor_search(self.pair, theta)
+        stuck = search.piece(*search.extremes()[0]).relaxed(theta)
+        low, high = max(radius(stuck), 1 - theta), 1.0
         low += LEAST * (1 - low)
         energy = None
         with suppress(LMIError):
@@ -179,18 +181,6 @@ class FreeNorm:
         except np.linalg.LinAlgError:
             return None
         return float(eigvalsh(taken[:N, :N] + taken[:N, N:] @ inner, norm)[-1])
-
-
-def largest_radius(pair: ContactPair, theta: float) -> tuple[float, Piece]:
-    """The larger spectral radius of two pieces of T_theta, which no norm beats, and the piece."""
-    search = factor_search(pair, theta)
-    pieces = [search.found(*pattern).piece for pattern in search.extremes()]
-    return max(((radius(piece.relaxed(theta)), piece) for piece in pieces), key=lambda found: found[0])
-
-
-def radius(J: Floats) -> float:
-    """The spectral radius of a matrix."""
-    return float(np.abs(np.linalg.eigvals(J)).max())
 
 
 def friction_threshold(

@@ -92,8 +92,8 @@ class Search:
         tangential = (0, 1, -1) if pair.rubs else (1,)  # without friction every node slides
         self.states = [(touching, slide) for touching in (True, False) for slide in tangential]
         self.sign, self._still = signs(pair), np.zeros(pair.neumann.grid.n, dtype=bool)
-        self._visited: dict[tuple[bytes, bytes], FoundFactor] = {}  # ways up meet
-        self._below: dict[tuple[bytes, bytes], float] = {}  # a level that the value of a piece does not exceed
+        self._visited: dict[bytes, FoundFactor] = {}  # ways up meet
+        self._below: dict[bytes, float] = {}  # a level that the value of a piece does not exceed
         self._reached = np.ones(pair.contact.grid.n, dtype=bool)
         self._reached[: len(self.sign)] = (self.sign != 0) | (not pair.rubs)
 
@@ -104,8 +104,20 @@ class Search:
         what = ((True, stick), (False, self.states[-1][1]))
         return [(np.full(n, touching), np.full(t, slides, dtype=np.int8)) for touching, slides in what]
 
-    def found(self, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> FoundFactor:
+    def random_pattern(self, random: np.random.Generator) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
+        """A random pattern."""
+        chosen = [self.states[i] for i in random.integers(len(self.states), size=self.pair.contact.grid.n)]
+        touching, sliding = (np.array(column) for column in zip(*chosen, strict=True))
+        return touching, sliding[: self.pair.contact.grid.t]
+
+    def piece(self, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> Piece:
         """The piece of a pattern, but that a node without a friction bound slides."""
+        sliding = np.where(self._reached[: len(sliding)] | (sliding != 0), sliding, 1).astype(np.int8)
+        pattern = Pattern(touching=np.asarray(touching, dtype=bool), sliding=sliding)
+        return Piece(pair=self.pair, pattern=pattern, sign=self.sign, still=self._still)
+
+    def found(self, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> FoundFactor:
+        """The largest value of the form on the piece of a pattern."""
         found = self.above(-np.inf, touching, sliding)
         assert found is not None
         return found
@@ -115,13 +127,11 @@ class Search:
 
         A Cholesky factorisation decides that in a fraction of the time that the eigenvalues take.
         """
-        sliding = np.where(self._reached[: len(sliding)] | (sliding != 0), sliding, 1).astype(np.int8)
-        pattern = Pattern(touching=np.asarray(touching, dtype=bool), sliding=sliding)
-        visited = pattern.touching.tobytes(), sliding.tobytes()
+        piece = self.piece(touching, sliding)
+        visited = piece.pattern.key
         if visited not in self._visited:
             if level >= self._below.get(visited, np.inf):
                 return None
-            piece = Piece(pair=self.pair, pattern=pattern, sign=self.sign, still=self._still)
             form = form_of(self._factors(answers(piece)))
             if level > -np.inf:
                 against = np.eye(len(form)) if self._against is None else self._against
@@ -154,7 +164,7 @@ class Search:
 
     def _tried(self, best: FoundFactor, level: float) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
         """Patterns that may be better, the most promising first: by the change of force that is worst on the best."""
-        patterns, node = self._neighbours(best.piece.pattern)
+        patterns, node = self.neighbours(best.piece.pattern)
         beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
         forces, size = self.pair.neumann.root @ best.eigenvectors, best.size or 1.0
         promised = np.round(beside.values(forces[:, -1]) / size, DIGITS)
@@ -175,7 +185,7 @@ class Search:
         self, best: FoundFactor, level: float
     ) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
         """Patterns that differ at two nodes side by side and are better up to rounding, the most promising first."""
-        patterns, node = _side_by_side(best.piece.pattern, *self._neighbours(best.piece.pattern))
+        patterns, node = _side_by_side(best.piece.pattern, *self.neighbours(best.piece.pattern))
         if not len(node):  # a single contact node
             return
         beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
@@ -185,7 +195,7 @@ class Search:
         for i in exceeds[np.argsort(-promised, kind="stable")]:
             yield patterns.touching[i], patterns.sliding[i]
 
-    def _neighbours(self, pattern: Pattern) -> tuple[Patterns, NDArray[np.intp]]:
+    def neighbours(self, pattern: Pattern) -> tuple[Patterns, NDArray[np.intp]]:
         """The patterns that differ at one node, and which."""
         touches, slides = (np.array(column) for column in zip(*self.states, strict=True))
         slides = np.where((slides != 0) | self._reached[:, None], slides, 1)
@@ -212,12 +222,8 @@ def worst_piece(
 
 
 def _from_starts(search: Search, *, random: np.random.Generator, starts: int) -> FoundFactor:
-    n, t = search.pair.contact.grid.n, search.pair.contact.grid.t
     patterns = search.extremes()
-    for _ in range(max(starts - len(patterns), 0)):
-        chosen = [search.states[i] for i in random.integers(len(search.states), size=n)]
-        touching, sliding = (np.array(column) for column in zip(*chosen, strict=True))
-        patterns.append((touching, sliding[:t]))
+    patterns += [search.random_pattern(random) for _ in range(starts - len(patterns))]
     with one_thread():
         return max((search.climb(search.found(*pattern)) for pattern in patterns[:starts]), key=lambda best: best.value)
 

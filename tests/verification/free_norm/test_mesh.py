@@ -15,7 +15,8 @@ import verification as vf
 from ndtheory.continuum.circle import disk
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.free_norm.circle import Circles
-from verification.free_norm.norm import NEAR, SMALL, FreeNorm, friction_threshold, largest_radius
+from verification.free_norm.norm import NEAR, SMALL, FreeNorm, friction_threshold
+from verification.free_norm.radius import largest_radius
 from verification.semidefinite.multipliers import QuadraticForms
 from verification.semidefinite.pattern_search import largest_factor
 from verification.testing.transforms import problem_in_units, problem_mirrored
@@ -82,7 +83,7 @@ def test_no_step_no_piece_and_no_run_is_slower_than_proved(data, theta):
     if not pair.rubs or np.linalg.matrix_rank(kernel) == len(kernel):  # then every pattern comes about
         worst = largest_factor(pair, float(theta), random=random, starts=3, norm=proof.norm)
         assert worst.value <= proof.factor * (1 + 1e-8)
-        assert largest_radius(pair, float(theta))[0] <= proof.factor * (1 + 1e-8)
+        assert largest_radius(pair, float(theta), evaluations=40).value <= proof.factor * (1 + 1e-8)
     run = vf.run(pair, theta=theta)
     start = pair.neumann.dual_norm(run.iterates[0].g - run.last.g)
     for i, iterate in enumerate(run.iterates):
@@ -106,7 +107,7 @@ def test_without_friction_nothing_is_gained():
     pair = vf.build(vf.Problem.from_dict(small(contact={"friction": 0})))
     proof, energy = free(pair).factor(0.7), QuadraticForms(pair, vf.measure(pair)).factor(0.7)
     assert (proof.factor, proof.norm.condition) == (pytest.approx(energy.value, rel=1e-8), pytest.approx(1.0))
-    assert largest_radius(pair, 0.7)[0] == pytest.approx(proof.factor, rel=1e-6)
+    assert largest_radius(pair, 0.7).value == pytest.approx(proof.factor, rel=1e-6)
 
 
 def test_a_mirror_image_and_other_units_have_the_same_factor():
@@ -167,7 +168,7 @@ def test_a_form_that_is_not_definite_is_refused_with_its_rounding():
     holds = forms.traces.in_norm(proof.norm.matrix, proof.multipliers, step=(0.7, 1 - 0.7))
     assert holds(proof.factor**2)
     assert not holds((0.99 * proof.factor) ** 2)
-    assert not holds(float(Fraction(largest_radius(pair, 0.7)[0]) ** 2))
+    assert not holds(float(Fraction(largest_radius(pair, 0.7).value) ** 2))
 
 
 def test_equal_blocks_with_much_friction_have_no_norm():
