@@ -649,3 +649,38 @@ check(
         "half of the second": ((2 / theta - 1) / rho, (1 / theta - 1) / rho),
     },
 )
+
+# --- a norm that the proof chooses ------------------------------------------------------------------------------------
+
+
+def _free_norm(form: Any) -> list[Goal]:
+    """The circle of h and its ends; smaller thetas in the same norm."""
+    low, high, smaller = form(q)
+    rest, z = 1 - theta, sp.Symbol("u", real=True) + sp.I * sp.Symbol("v", real=True)
+    u, v = z.as_real_imag()
+    D = (u - rest) ** 2 + v**2
+    real, square = theta * (u - rest) / D, theta**2 / D  # of h = theta/(z - rest)
+    on_circle = lambda expression: sp.numer(sp.together(expression)).expand().subs(v**2, q**2 - u**2)
+    share = 1 / (1 + p)
+    return [
+        equal(on_circle(square - (low + high) * real + low * high), 0),
+        equal(low, theta / (-q - rest)),
+        equal(high, theta / (q - rest)),
+        equal(smaller(share), 1 - share + share * q),  # T_(s theta) = (1 - s) id + s T_theta
+    ]
+
+
+check(
+    id="x-free-norm",
+    text="Where (1 - theta) g + theta p = z g with |z| = q, that is for g = h p, h = theta/(z - (1 - theta)), the terms"
+    " of Q in q^2 |g|_Q^2 - |(1 - theta) g + theta p|_Q^2 cancel: what is left is -Sigma(h p, p).  By the strict lemma"
+    " of Kalman, Yakubovich and Popov some Q makes the form definite if and only if that is positive on the whole"
+    " circle, which meets the real axis at -theta/(q+1-theta) and theta/(q-1+theta).  T_(s theta) is a mean of the"
+    " identity and T_theta.",
+    goals=_free_norm,
+    forms={"repaired": lambda q: (-theta / (q + 1 - theta), theta / (q - 1 + theta), lambda s: 1 - s * (1 - q))},
+    mutants={
+        "a circle with another end": lambda q: (-theta / (q + 1), theta / (q - 1 + theta), lambda s: 1 - s * (1 - q)),
+        "the share of q": lambda q: (-theta / (q + 1 - theta), theta / (q - 1 + theta), lambda s: s * q),
+    },
+)
