@@ -21,6 +21,8 @@ from verification.certificate.continuum import certify_continuum
 from verification.constants.cells import halved_cells, rho_of_cells
 from verification.figures import draw_region, draw_waterfall, save
 from verification.figures.style import BODIES, new_figure, styled
+from verification.free_norm.norm import FreeNorm, friction_threshold
+from verification.free_norm.two_layers import two_layers
 from verification.sweeps.region import chart
 
 Numbers = dict[str, Any]
@@ -85,13 +87,50 @@ def factors() -> list[Numbers]:
     rows = []
     for theta in THETAS:
         found = vf.compare(vf.example("section6"), theta=theta, bounds=("energy", "lmi")).to_dict()
+        free = of_section_6(0.2).factor(theta)
         rows.append({
             "theta": theta,
+            "free": None if free is None else free.factor,
             **{name: (found[name]["factor"] or {"value": None})["value"] for name in ("energy", "lmi")},
             "attained": found["lmi"]["lower"],
             "observed": found["run"]["observed_rate"] if found["run"]["converged"] else None,
         })  # fmt: skip
     return rows
+
+
+def of_section_6(k: float, halvings: int = 0) -> FreeNorm:
+    """The free norm of Section 6 at a friction, on its mesh or a halved one."""
+    pair = vf.build(vf.example("section6").refined(halvings).changed(friction=str(k)))
+    return FreeNorm(pair, vf.measure(pair))
+
+
+def free_norm() -> Numbers:
+    """Section 6 in a free norm: proved on its mesh, on finer ones, and of the layers that contain its bodies."""
+    proved = vf.certify(vf.example("section6"), theta="0.7", edition="lyapunov")
+    assert vf.check_again(proved.to_dict()).accepted
+    fine = [of_section_6(0.2, halvings).factor(0.7) for halvings in range(HALVINGS)]
+    rough = of_section_6(0.9)
+    pair = vf.build(vf.example("section6"))
+    measured = vf.measure(pair)
+    layers = two_layers(
+        young=(70000, 20000), poisson=("0.3", "0.3"), depth=("0.3", "0.3"), friction="0.2", radius="0.1", theta="0.7",
+        verified=True,
+    ).roles[0]  # fmt: skip
+    assert layers.energy.factor is not None
+    return {
+        "factor": float(proved.factor),
+        "condition": float(Fraction(proved.claim["norm"]["condition"])),
+        "bits": proved.claim["bits"],
+        "radius": proved.lower,
+        "fine": [found.factor for found in fine if found is not None],
+        "rough": [found.factor for found in (rough.factor(0.6), rough.factor(0.8)) if found is not None],
+        "k": friction_threshold(pair, measured, measured.friction_threshold.value)[0],
+        "layers": {
+            "factor": layers.lyapunov.factor.hi,
+            "energy": layers.energy.factor.hi,
+            "k": layers.lyapunov.friction_threshold.lo,
+        },
+    }
 
 
 def halved(problem: vf.Problem, *names: str) -> list[Numbers]:
@@ -153,6 +192,7 @@ def draw_factors(rows: list[Numbers]) -> Figure:
         looks = {
             "energy": ("bound in energy norms", "-", BODIES[1]),
             "lmi": ("semidefinite bound", "--", BODIES[0]),
+            "free": ("free norm", "-.", "#7A2E8C"),
             "attained": ("largest factor found", ":", "black"),
         }
         for name, (label, line, colour) in looks.items():
@@ -202,6 +242,7 @@ def write(folder: Path) -> None:
         "cells": cells(),
         "continuum": continuum(),
         "certificate": certificate(),
+        "free": free_norm(),
     }
     (folder / "numbers.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
     save(draw_waterfall(compared.losses, "MPa"), folder / "losses.svg")
