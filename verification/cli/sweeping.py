@@ -246,7 +246,7 @@ def every(
 def region(typed: Typed, target: Path, bounds: tuple[str, ...] | None, store: Path | None, as_json: bool) -> None:
     """Draw over theta and k where each bound proves contraction.
 
-    The regions are those of the bounds for the bodies of FILE; points show how runs end.  Both axes are logarithmic;
+    The regions belong to the bounds for the bodies of FILE; points show how runs end.  Both axes are logarithmic;
     theta and k have no unit.
 
     \b

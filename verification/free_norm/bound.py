@@ -34,7 +34,7 @@ _none: dict[str, Any] = {"why": lambda found: found.why, "default": None}
 
 @dataclass(frozen=True, kw_only=True)
 class FreeNormOfPair(Part):
-    """What is proved of a pair of bodies in a norm that the proof may choose."""
+    """The numbers proved of a pair of bodies in a norm that the proof may choose."""
 
     part: ClassVar[str] = "Bound in the free norm"
 

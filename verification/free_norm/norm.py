@@ -188,7 +188,7 @@ def friction_threshold(
 ) -> tuple[float, Proved]:
     """A friction up to which every small theta contracts in a free norm, close to the largest found, and the proof.
 
-    ``start`` is a friction to begin with, as that of the theorem in energy norms.
+    ``start`` is a friction to begin with, as the threshold in energy norms.
 
     Raises
     ------

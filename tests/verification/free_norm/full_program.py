@@ -57,24 +57,24 @@ class FullProgram:
         sizes = [np.linalg.norm(form, axis=(1, 2)) for form in forms]
         sizes[2:] = sizes[1:2] * len(sizes[2:])  # one for tau, a, b, so that 4 a b >= tau^2 stays as it is
         self.conditions = [form / size[:, None, None] for form, size in zip(forms, sizes, strict=True)]
-        self._Q, self._margin = cp.Variable((m, m), symmetric=True), cp.Variable()
-        self._square = cp.Parameter(nonneg=True)
-        self._multipliers = [cp.Variable(len(form), nonneg=True) for form in forms]
-        both = zip(self.conditions, self._multipliers, strict=True)
+        self.norm, self.margin = cp.Variable((m, m), symmetric=True), cp.Variable()
+        self.square = cp.Parameter(nonneg=True)
+        self.unknowns = [cp.Variable(len(form), nonneg=True) for form in forms]
+        both = zip(self.conditions, self.unknowns, strict=True)
         sigma = cp.reshape(sum(form.reshape(len(form), -1).T @ x for form, x in both), (m + n, m + n), order="C")
-        after = self.step.T @ self._Q @ self.step + sigma
-        definite = self._square * (self.state.T @ self._Q @ self.state) - after >> self._margin * np.eye(m + n)
-        tangential = [self._multipliers[1:]] if pair.rubs else []
+        after = self.step.T @ self.norm @ self.step + sigma
+        definite = self.square * (self.state.T @ self.norm @ self.state) - after >> self.margin * np.eye(m + n)
+        tangential = [self.unknowns[1:]] if pair.rubs else []
         cones = [cp.SOC(a + b, cp.vstack([tau, a - b]), axis=0) for tau, a, b in tangential]
-        self._problem = cp.Problem(cp.Maximize(self._margin), [definite, cp.trace(self._Q) == m, *cones])
+        self.problem = cp.Problem(cp.Maximize(self.margin), [definite, cp.trace(self.norm) == m, *cones])
 
     def proves(self, q):
         """Return Q, in y and of trace m, and the multipliers of the conditions, where they prove q; None otherwise."""
-        self._square.value = q**2
+        self.square.value = q**2
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # "may be inaccurate": the eigenvalues below decide
-            self._problem.solve(solver=cp.CLARABEL, **ACCURACY)
-        Q, multipliers = self._Q.value, [np.maximum(x.value, 0) for x in self._multipliers]
+            self.problem.solve(solver=cp.CLARABEL, **ACCURACY)
+        Q, multipliers = self.norm.value, [np.maximum(x.value, 0) for x in self.unknowns]
         for tau, a, b in [multipliers[1:]] if len(multipliers) > 1 else []:
             np.minimum(tau, 2 * np.sqrt(a * b), out=tau)
         form = q**2 * self.state.T @ Q @ self.state - self.step.T @ Q @ self.step
