@@ -8,7 +8,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from problem_list import changed, small
-from strategies import AT_NIGHT
 
 import verification as vf
 from verification.algorithm.rates import ForceNorm
