@@ -30,7 +30,7 @@ from verification.semidefinite.neighbours import responses
 from verification.semidefinite.pattern_search import DIGITS, Search, factor_search
 
 #: Spectral radii that a search evaluates, and random starts, at most.
-EVALUATIONS, RANDOM = 300, 8
+EVALUATIONS, RANDOM = 300, 24
 
 #: Neighbours that are evaluated before a climb ends, the most promising ones.
 TRIED = 8

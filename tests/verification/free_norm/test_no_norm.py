@@ -1,5 +1,6 @@
 """Equal blocks with much friction: pieces of T_theta with a spectral radius above 1, and runs that begin in them."""
 
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import islice, takewhile
@@ -54,18 +55,21 @@ def steps(pair, theta, start, count):
 @pytest.mark.parametrize(
     ("radius", "value", "eigenvalue", "pattern"),
     [
-        ("1/2", 1.8045, -8.348, ("o> T> T> T> o< T< T< T< o<", "o> T> T> T> o> T< T< T< o<")),
-        ("4/5", 1.1641, 1.292 + 1.384j, ("o< T< T< o< o< o< o< o< o<", "o> o> o> o> o> o> T> T> o>")),
+        ("1/2", 1.8045, -8.348, r"o> T> T> T> .. T< T< T< o<"),
+        ("4/5", 1.1641, 1.292 + 1.384j, r"o< T< T< o< o< o< o< o< o<|o> o> o> o> o> o> T> T> o>"),
     ],
 )
 def test_equal_blocks_have_a_piece_in_which_no_norm_contracts(radius, value, eigenvalue, pattern):
-    """T touches, o is open, < and > slide to either side; one pattern or its mirror image is found."""
+    """T touches, o is open, < and > slide to either side; one pattern or its mirror image is found.
+
+    The node in the middle of the first does not move with the dominant eigenvector, so its state does not matter.
+    """
     best, largest = found(radius)
     piece = best.pieces[0].pattern
     assert best.value == pytest.approx(value, abs=1e-4)
     assert complex(largest.real, abs(largest.imag)) == pytest.approx(eigenvalue, abs=1e-3)
     states = zip(piece.touching.tolist(), piece.sliding.tolist(), strict=True)
-    assert " ".join("oT"[touches] + "=><"[slides] for touches, slides in states) in pattern
+    assert re.fullmatch(pattern, " ".join("oT"[touches] + "=><"[slides] for touches, slides in states))
     pair = best.pieces[0].pair
     assert FreeNorm(pair, vf.measure(pair)).factor(THETA) is None
 
