@@ -1,4 +1,4 @@
-"""Equal blocks with much friction: pieces of T_theta with a spectral radius above 1, and runs that begin in them."""
+"""Much friction: pieces of T_theta with a spectral radius above 1, and runs that begin in them."""
 
 import re
 from dataclasses import replace
@@ -13,7 +13,7 @@ import verification as vf
 from verification.free_norm.norm import FreeNorm
 from verification.free_norm.radius import largest_radius
 
-#: k and theta of the example; 9 contact nodes on blocks of 1 x 1.
+#: k and theta of the equal blocks; 9 contact nodes on blocks of 1 x 1.
 K, THETA = 8, 0.3
 
 
@@ -42,7 +42,7 @@ def with_fixed_point(piece, moved=3.0):
 
 
 def beside(piece, pair, g, distance=1e-6):
-    """A force at some distance from g along the dominant eigenvector of J, in the norm (5.21)."""
+    """A force at some distance from g, relative to its size, along the dominant eigenvector of J in the norm (5.21)."""
     values, vectors = np.linalg.eig(piece.relaxed(THETA))
     direction = piece.basis @ vectors[:, np.argmax(np.abs(values))].real
     return g + distance * pair.neumann.dual_norm(g) / pair.neumann.dual_norm(direction) * direction
@@ -118,3 +118,17 @@ def test_where_the_real_part_of_an_eigenvalue_is_above_1_no_theta_that_was_tried
     assert min(state.residual for state in late) > 1e-3 * norm(g)
     assert 1e-3 * norm(g) < min(norm(state.g - g) for state in late)
     assert max(norm(state.g - g) for state in run) < norm(g)
+
+
+def test_on_section_6_every_load_has_one_solution_up_to_a_friction_and_some_load_has_two_a_little_above():
+    """Below, some norm contracts for every small theta.  Above, T' has a real eigenvalue above 1 on a piece."""
+    below, above = (vf.build(vf.example("section6")).at(friction=k) for k in ("2.4", "2.7"))
+    assert FreeNorm(below, vf.measure(below)).every_small_theta() is not None
+    assert FreeNorm(above, vf.measure(above)).every_small_theta() is None
+    best = largest_radius(above, 0.02)
+    assert 1 < best.value < 1.002
+    pair, g = with_fixed_point(best.pieces[0], moved=3e-4)
+    one, other = (steps(pair, 0.1, start, 1500)[-1] for start in (g, beside(best.pieces[0], pair, g, 1e-2)))
+    norm = pair.neumann.dual_norm
+    assert max(one.residual, other.residual) < 1e-10 * norm(g)
+    assert norm(other.g - g) > 1e-2 * norm(g)
