@@ -185,7 +185,11 @@ class OfVectors(Rule):
 
 @dataclass(frozen=True)
 class Aitken(OfVectors):
-    """Aitken's factor ``theta <- -theta <r', r - r'> / |r - r'|^2`` from the last two residuals ``r = T g - g``."""
+    """Aitken's factor ``theta <- -theta <r', r - r'> / |r - r'|^2`` from the last two residuals ``r = T g - g``.
+
+    With the changes s of g and y of ``g - T g`` it is ``<s, y>/<y, y>``, the second step length of Barzilai and Borwein
+    (1988).  Without friction y is a change of gradients in the inner product of (5.21).
+    """
 
     name = "aitken"
     words = "Aitken relaxation"

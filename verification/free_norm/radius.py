@@ -30,7 +30,7 @@ from verification.semidefinite.neighbours import responses
 from verification.semidefinite.pattern_search import DIGITS, Search, factor_search
 
 #: Spectral radii that a search evaluates, and random starts, at most.
-EVALUATIONS, RANDOM = 300, 8
+EVALUATIONS, RANDOM = 300, 24
 
 #: Neighbours that are evaluated before a climb ends, the most promising ones.
 TRIED = 8
@@ -121,8 +121,8 @@ class Climb:
 def largest_radius(pair: ContactPair, theta: float, *, evaluations: int = EVALUATIONS, length: int = 1) -> FoundRadius:
     """Search the pieces of T_theta for a large spectral radius: no norm contracts by less under all loads.
 
-    The starts are: all nodes stick that can, all are open and slide one way, the pieces to which a climb of ``|J|``
-    leads from these, and random patterns, always the same.  A larger radius may exist.
+    The starts are: all nodes stick that can; all are open but one, and slide one way; the pieces to which climbs of
+    ``|J|`` lead; and random patterns, always the same.  A larger radius may exist.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def largest_radius(pair: ContactPair, theta: float, *, evaluations: int = EVALUA
     """
     climb = Climb(pair, theta, evaluations)
     with one_thread():
-        best = climb.highest(_starts(climb.search))
+        best = climb.highest(_starts(climb))
         if length > 1:
             climb.left += evaluations
             random = np.random.default_rng(0)
@@ -149,9 +149,12 @@ def largest_radius(pair: ContactPair, theta: float, *, evaluations: int = EVALUA
     return best
 
 
-def _starts(search: Search) -> Iterator[tuple[Piece, ...]]:
-    for pattern in search.extremes():
-        yield (search.piece(*pattern),)
+def _starts(climb: Climb) -> Iterator[tuple[Piece, ...]]:
+    search = climb.search
+    stick, (none, slide) = search.extremes()
+    yield (search.piece(*stick),)
+    touched = (search.piece(np.arange(len(none)) == node, slide) for node in range(min(len(none), climb.left)))
+    yield max((climb.at(piece) for piece in touched), key=lambda found: found.value).pieces
     for pattern in search.extremes():
         yield (search.climb(search.found(*pattern)).piece,)
     random = np.random.default_rng(0)

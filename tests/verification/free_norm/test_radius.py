@@ -33,13 +33,13 @@ def assert_no_norm_beats_it(pair, theta, length):
     assert proved is None or found.value <= proved.factor + ROUNDING
 
 
-@fewer(5)
+@fewer(5, at_night=10)
 @given(mesh_pairs(friction=FRICTIONS, law="nonlocal", varying=True), THETAS, st.integers(1, 3))
 def test_no_proved_norm_has_a_factor_below_a_radius_on_meshes(pair, theta, length):
     assert_no_norm_beats_it(pair, theta, length)
 
 
-@fewer(5)
+@fewer(5, at_night=10)
 @given(matrix_pairs(friction=FRICTIONS, most_nodes=3), THETAS, st.integers(1, 3))
 def test_no_proved_norm_has_a_factor_below_a_radius_on_random_matrices(pair, theta, length):
     assert_no_norm_beats_it(pair, theta, length)
