@@ -155,5 +155,5 @@ def drawn(seed: int, columns: Sequence[int] = (6, 8, 10)) -> tuple[Periodic, flo
     radius = round(random.uniform(0.1, 0.6), 2)
     mesh = Periodic(contact=sides[0], neumann=sides[1], period=1.0, radius=radius, columns=n)
     rho = float(eigh(mesh.stiffness(mesh.contact), mesh.stiffness(mesh.neumann), eigvals_only=True)[-1])
-    theta = round(random.uniform(0.1, 0.9) * min(2 / (1 + rho), 1.0), 3)
+    theta = float(f"{random.uniform(0.1, 0.9) * min(2 / (1 + rho), 1.0):.3g}")
     return mesh, round(10 ** random.uniform(-1.5, 0.3), 3), theta
