@@ -67,7 +67,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "__init__ calibrating check claims continuum contraction exact_bodies proved_constants sections"
         ),
     },
-    "free norm": {"verification.free_norm": "__init__ bound circle norm radius search sections two_layers"},
+    "free norm": {"verification.free_norm": "__init__ bound cells circle norm radius search sections two_layers"},
     "runs over grids": {
         "verification.sweeps": ("__init__ best_theta export grid pieces region row sections store sweep workers")
     },

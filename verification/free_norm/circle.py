@@ -143,7 +143,7 @@ class Circles:
         for h in (_point(ends, u) for u in at):
             for both in self._parts:
                 rows = [h * of_g + of_p for of_g, of_p in both]
-                columns.append([_real(r) if h.imag else np.vstack([r.real, 0 * r.real]) for r in rows])
+                columns.append([real_rows(r) if h.imag else np.vstack([r.real, 0 * r.real]) for r in rows])
                 sizes.append(columns[-1][0].shape[1])
         left, right = (np.hstack(list(rows)) for rows in zip(*columns, strict=True))
         edges = np.cumsum([0, *sizes])
@@ -193,6 +193,6 @@ def _reached(rows: Floats, kinds: Indices) -> Floats:
     return np.asarray(np.where(lengths > ROUNDING * longest, 1.0, 0.0)[:, None] * rows)
 
 
-def _real(rows: Complex) -> Floats:
+def real_rows(rows: Complex) -> Floats:
     """Rows whose products, in pairs, are the real parts of those of complex rows."""
     return np.vstack([np.hstack([rows.real, -rows.imag]), np.hstack([rows.imag, rows.real])])
