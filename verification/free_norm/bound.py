@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from verification.semidefinite.multipliers import QuadraticForms
 
 #: Friction values that trace the border of the region, at most.
-TRACED = 15
+TRACED = 25
 
 NO_NORM = "no norm is found in which theta = {:g} contracts"
 

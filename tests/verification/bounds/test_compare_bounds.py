@@ -85,7 +85,7 @@ def test_a_bound_that_takes_the_matrices_brings_what_takes_long(worked_out):
     assert found.bounds["energy"].not_computed == NOT_ASKED
 
 
-@pytest.mark.parametrize("bounds", [None, ("lmi",), QUICK, tuple(BOUNDS)], ids=str)
+@pytest.mark.parametrize("bounds", [None, ("lmi",), QUICK, BY_DEFAULT], ids=str)
 def test_parts_are_told_again_as_they_were_told_first(bounds):
     first, again = Heard(), Heard()
     vf.compare(PROBLEM, bounds=bounds, listener=first).tell(again)
