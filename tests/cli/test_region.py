@@ -66,7 +66,7 @@ def test_region_writes_a_picture_with_both_axes_every_edition_and_every_outcome(
 
 def test_region_is_about_the_exchanged_roles_where_they_were_asked_for(call, charted, quick, monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr(plane, "chart", lambda problem, store, progress: asked.append(problem) or charted[2])
+    monkeypatch.setattr(plane, "chart", lambda problem, bounds, store, progress: asked.append(problem) or charted[2])
     for words in ((), ("--swap-roles",)):
         assert call("region", charted[0], "-o", tmp_path / "plane.svg", *words).status == 0
     assert [problem.iteration.neumann_body for problem in asked] == [2, 1]
