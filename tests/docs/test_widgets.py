@@ -156,6 +156,7 @@ ANSWERS = {
         "it tends to 2.35 or more",
         "Cells 2 and 1 times as high as wide: rho* = 2.355, waves as short as the cells decide",
     ),
+    "best_theta": ("near 0.80", "k = 0.8: the best theta is in (5.21) 0.10, with the factor 0.996, in a free"),
     "friction": ("A opens, B sticks", "k = 4: this load has 3 solutions: open, slip, stick"),
     "theorem_and_experiment": ("all of them", "lmi for theta below 0.38. Of 10 runs 4 are proved to converge"),
     "prediction": ("nearly all at one step", "k = 0.2: the matrix of step 4 predicts the rate 0.50078235"),

@@ -7,7 +7,7 @@ There is a Q > 0 for which::
     q^2 g' Q g - |theta p + (1 - theta) g|_Q^2 - Sigma(g, p)
 
 is positive definite, if and only if ``M(h) = -Sigma(h p, p)`` is for every complex ``h = theta/(z - (1 - theta))``,
-|z| = q > 1 - theta.  So Q is not in the programs for multipliers, and an equation of Riccati gives it afterwards.  The
+``|z| = q > 1 - theta``.  So Q is not in the programs for multipliers; an equation of Riccati gives it afterwards.  The
 proof is in ``docs/free_norm.md``.
 
 In traces d_1 of the contact body p and v are bounded, so that M(h) has the size of the multipliers.
@@ -63,7 +63,7 @@ class Circle:
     margin : float
         The least eigenvalue of M, by the points looked at; lambda is at most 1.
     largest : float
-        The largest |h|.
+        The largest ``|h|``.
     """
 
     margin: float

@@ -10,7 +10,7 @@ from types import ModuleType
 #: The pages, by name.
 PAGES = (
     *("open_or_closed", "which_side", "constants", "friction", "theorem_and_experiment", "prediction"),
-    *("grids", "constant_theta", "beyond_constant", "other_code"),
+    *("grids", "constant_theta", "best_theta", "beyond_constant", "other_code"),
 )
 
 
