@@ -19,7 +19,7 @@ BEGIN, END = "<!-- floors: python tests/test_floors.py -->", "<!-- end of floors
 FLOORS: dict[str, dict[str, str]] = {
     "theory": {
         "ndtheory.symbolic": "__init__ checks dimension engine further mechanics quotient section5 symbols",
-        "ndtheory.continuum": "__init__ calibration circle intervals rectangles segments strip wedges",
+        "ndtheory.continuum": "__init__ calibration circle intervals rectangle_circle rectangles segments strip wedges",
         "ndtheory": "__init__ bounds constants energy_norms errors keys moduli number scalar statements texts",
     },
     "elastic bodies": {
