@@ -66,8 +66,9 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification.certificate": (
             "__init__ calibrating check claims continuum contraction exact_bodies proved_constants sections"
         ),
+        "verification.free_norm": "__init__ numbers rectangles search",
     },
-    "free norm": {"verification.free_norm": "__init__ bound circle norm radius search sections two_layers"},
+    "free norm": {"verification.free_norm": "bound circle norm radius sections two_layers"},
     "runs over grids": {
         "verification.sweeps": ("__init__ best_theta export grid pieces region row sections store sweep workers")
     },
