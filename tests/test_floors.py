@@ -19,7 +19,7 @@ BEGIN, END = "<!-- floors: python tests/test_floors.py -->", "<!-- end of floors
 FLOORS: dict[str, dict[str, str]] = {
     "theory": {
         "ndtheory.symbolic": "__init__ checks dimension engine further mechanics quotient section5 symbols",
-        "ndtheory.continuum": "__init__ calibration circle intervals rectangles segments strip wedges",
+        "ndtheory.continuum": "__init__ calibration circle intervals rectangle_circle rectangles segments strip wedges",
         "ndtheory": "__init__ bounds constants energy_norms errors keys moduli number scalar statements texts",
     },
     "elastic bodies": {
@@ -66,8 +66,9 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification.certificate": (
             "__init__ calibrating check claims continuum contraction exact_bodies proved_constants sections"
         ),
+        "verification.free_norm": "__init__ numbers rectangles search",
     },
-    "free norm": {"verification.free_norm": "__init__ bound cells circle norm radius search sections two_layers"},
+    "free norm": {"verification.free_norm": "bound cells circle norm radius sections two_layers"},
     "runs over grids": {
         "verification.sweeps": ("__init__ best_theta export grid pieces region row sections store sweep workers")
     },

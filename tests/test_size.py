@@ -11,7 +11,7 @@ BESIDE = {tokenize.COMMENT, tokenize.NL}
 LAYOUT = {tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 #: Lines and tokens of code of the three packages together at most; comments, docstrings and layout are no tokens.
-LINES, TOKENS = 56_000, 401_000
+LINES, TOKENS = 56_200, 403_000
 
 #: Lines of each package at most, those of packages inside it apart: a tenth more than it has.
 BUDGET = {
@@ -27,7 +27,7 @@ BUDGET = {
     "verification.coupling": 8550,
     "verification.exploration": 850,
     "verification.figures": 1800,
-    "verification.free_norm": 1650,
+    "verification.free_norm": 1750,
     "verification.interface": 4400,
     "verification.ledger": 4950,
     "verification.machine": 300,

@@ -61,7 +61,7 @@ class Multipliers:
     @property
     def enclosed(self) -> Multipliers:
         """The same as intervals."""
-        return Multipliers(**{name: Interval.of(value) for name, value in vars(self).items()})
+        return replace(self, **{name: Interval.of(value) for name, value in vars(self).items()})
 
 
 #: Both flexibilities, multipliers, and the square of the smoothing, as intervals.
@@ -167,7 +167,7 @@ class TwoLayers:
         True
         """
         circle = (Interval.of(ends[0]), Interval.of(ends[1]))
-        return self._everywhere(by, lambda given: _definite(pencil(*given, circle)))
+        return self.everywhere(by, lambda given: definite(pencil(*given, circle)))
 
     def contracts_in_energy(self, theta: Fraction, q: Fraction, by: Multipliers, weight: Fraction) -> bool:
         """True if T_theta is proved to contract by q in the norm (5.21), by the multipliers times a weight > 0.
@@ -179,11 +179,12 @@ class TwoLayers:
         must be positive definite at every wave number, with ``v = A_n g + A_c p`` in M.
         """
         size, step = Interval.of(weight), (Interval.of(theta), Interval.of(1 - theta), Interval.of(q).square())
-        return weight > 0 and self._everywhere(by, lambda given: _positive(energy_form(*given, step, size)))
+        return weight > 0 and self.everywhere(by, lambda given: _positive(energy_form(*given, step, size)))
 
-    def _everywhere(self, by: Multipliers, holds: Callable[[Enclosed], bool]) -> bool:
+    def everywhere(self, by: Multipliers, holds: Callable[[Enclosed], bool]) -> bool:
+        """True if multipliers are positive and something is shown to hold on parts that cover all wave numbers."""
         sizes = [1 / self.contact.thickness, 1 / self.neumann.thickness, 6 / self.radius]
-        positive = min(vars(by).values()) > 0
+        positive = min(by.normal, by.alpha, by.beta) > 0
         return positive and everywhere(lambda part: holds(self.enclosed(part, by.enclosed)), sizes, shortest=SHORTEST)
 
     def enclosed(self, part: Part, by: Multipliers) -> Enclosed:
@@ -250,7 +251,7 @@ def _stiffness(strip: Strip, part: Part, *, over: bool) -> tuple[Interval, ...]:
     return tuple(Interval.between(lo, hi) * entry for entry in strip.over_wave_number(part))
 
 
-def _definite(form: Pencil) -> bool:
+def definite(form: Pencil) -> bool:
     """True if M is proved to be positive definite on the whole circle."""
     low, high, middle = form.determinants
     if min(form.low[0].lo, form.high[0].lo, low.lo, high.lo) <= 0:

@@ -32,13 +32,31 @@ def test_the_document_has_one_proved_end_for_each_bound(call, write):
     assert document["friction_threshold"]["lo"] <= document["friction_limit"]["lo"]
 
 
-def test_a_theta_or_a_friction_beyond_the_proof_is_no_conclusion(call, write):
-    beyond = call("certify", "--continuum", write(), "--theta", "0.95", "--json")
-    assert (beyond.status, beyond.document["verdict"], beyond.document["factor"]) == (1, "no conclusion", None)
+def test_what_energy_norms_leave_open_is_proved_in_a_norm_that_the_proof_chooses(call, write):
+    beyond = call("certify", "--continuum", write({"contact.radius": "0.1"}), "--theta", "0.95", "--json")
+    assert (beyond.status, beyond.document["verdict"], beyond.document["factor"]) == (0, "contraction", None)
     assert "theta" in beyond.document["reason"]["factor"]
-    rough = call("certify", "--continuum", write({"contact.friction": "0.4"}))
-    assert rough.status == 1
-    assert "no theta is proved to contract: no conclusion" in " ".join(rough.out.split())
+    free = beyond.document["free_norm"]
+    assert free["theta_max"]["lo"] == 1
+    assert free["factor"]["hi"] < 0.8
+    assert {number["level"] for number in free.values() if "level" in (number if isinstance(number, dict) else ())} == {
+        "guaranteed"
+    }
+    rough = call("certify", "--continuum", write({"contact.friction": "0.4", "contact.radius": "0.1"}))
+    said = " ".join(rough.out.split())
+    assert rough.status == 0
+    assert "no theta is proved to contract in energy norms" in said
+    assert "In a norm that the proof chooses every small theta contracts for k < 0.80" in said
+    assert max(map(len, rough.out.splitlines()[:-1])) <= 80
+
+
+def test_a_friction_beyond_both_theorems_is_no_conclusion(call, write):
+    answer = call("certify", "--continuum", write({"contact.friction": "0.9", "contact.radius": "0.1"}), "--json")
+    assert (answer.status, answer.document["verdict"], answer.document["solvable"]) == (1, "no conclusion", False)
+    free = answer.document["free_norm"]
+    assert free["theta_max"] is free["factor"] is free["theta_best"] is free["factor_best"] is None
+    assert "no multipliers" in free["reason"]["theta_max"]
+    assert free["friction_threshold"]["lo"] < 0.9
 
 
 def test_where_gamma_c_reaches_an_end_small_theta_are_proved_and_none_in_numbers(call, write):
@@ -47,6 +65,7 @@ def test_where_gamma_c_reaches_an_end_small_theta_are_proved_and_none_in_numbers
     assert answer.status == 1
     assert "Every small theta contracts for k < 0.358:" in said
     assert "Nothing is proved for any particular theta" in said
+    assert "In a norm that the proof chooses every small theta contracts for k < 0.80" in said
     assert "rho >= 19.26 wedges at the ends of Gamma_c" in said
 
 

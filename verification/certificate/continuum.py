@@ -1,4 +1,4 @@
-"""The theorem in energy norms for the bodies of a problem file themselves, not for a mesh.
+"""The theorem in energy norms, and the one in a norm that the proof chooses, for the bodies of a problem file.
 
 The mesh of the file enters no bound; its rho is shown beside the continuum's.  The continuum does not have the waves
 that are as short as the cells.  Their ratio of stiffnesses may be larger, also on finer meshes of such cells, and then
@@ -32,6 +32,7 @@ from verification.certificate.calibrating import for_cut_off, for_traces
 from verification.constants.cells import rho_of_cells
 from verification.constants.measuring import of_energy
 from verification.document import Document
+from verification.free_norm.rectangles import RectangleNorm, rectangle_norm
 from verification.interface.pair import pair_from
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
@@ -78,7 +79,7 @@ class FileMesh(Part):
         **MEASURED,
     )
     theta: float | None = key(
-        r"the file's $\theta$, with `auto` `theta_proved`",
+        r"the file's $\theta$, with `auto` `theta_proved`, or else `free_norm.theta_best`",
         null="where there is none",
         why="the file gives no theta, and none is proved in the continuum",
     )
@@ -103,7 +104,8 @@ class FileMesh(Part):
 class ContinuumCertificate(Document):
     """Bounds that are guaranteed for the continuum.
 
-    ``energy`` is the theorem for the upper bounds of the constants, None where rho is not bounded.
+    ``energy`` is the theorem for the upper bounds of the constants, None where rho is not bounded; ``free_norm`` has
+    the numbers of the circle criterion for two rectangles.
     """
 
     schema: ClassVar[str] = "ndtheory.certificate/1"
@@ -128,9 +130,10 @@ class ContinuumCertificate(Document):
     theta: float | None = key("the theta of the file", null=r"for `auto` and without a bound of $\rho$")
     factor: Number | None = key("the factor at `theta`, at most", null="where `theta` is, or lies outside `interval`")
     verdict: str = key(
-        r"`contraction` where it is proved at `theta`, with `auto` at some $\theta$; else `no conclusion`;"
-        " for the continuum"
+        r"`contraction` where it is proved at the file's $\theta$, with `auto` at some $\theta$, in energy norms or in"
+        " the free norm; else `no conclusion`; for the continuum"
     )
+    free_norm: RectangleNorm = key("in a norm that the proof chooses")
     mesh: FileMesh = key("the mesh of the file, whose rho may be larger than the continuum's")
     not_claimed: str = key("what the numbers do not claim", default=NOT_CLAIMED)
 
@@ -239,11 +242,15 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     progress("bounding the constants of the continuum", None)
     constants = bounded(model)
     energy = statement(constants, friction=k, theta=None if given == "auto" else given)
+    progress("proving contraction in a norm that the proof chooses", None)
+    free = rectangle_norm(model, constants, k, None if given == "auto" else Fraction(given))
     threshold, kappas = friction_threshold(constants), constants.kappa(k)
     assert threshold.lo is not None
+    small = max(number.lo or 0.0 for number in (threshold, free.friction_threshold) if number)
     inside = None if energy is None else energy.interval
     theta = None if energy is None else energy.theta
     proved = inside is not None if energy is None or theta is None else energy.verdict == "contraction"
+    proved = proved or (free.theta_best if given == "auto" else free.factor) is not None
     best = None if energy is None else energy.theta_proved
 
     def end(name: str, of: Callable[[Fraction], Number], side: str, times: Fraction = Fraction(1)) -> Number | None:
@@ -261,7 +268,7 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
         friction=float(k),
         friction_threshold=threshold,
         friction_limit=end("friction_limit_multiple", lower, "lo", k),
-        solvable=k < Fraction(threshold.lo),
+        solvable=k < Fraction(small),
         interval=[math.nextafter(inside[0], 1.0) if inside[0] else 0.0, highest.value] if inside and highest else None,
         theta_max_proved=highest,
         theta_proved=best,
@@ -269,7 +276,8 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
         theta=theta,
         factor=end("factor", upper, "hi"),
         verdict="contraction" if proved else "no conclusion",
-        mesh=file_mesh(problem, best if given == "auto" else float(given), progress),
+        free_norm=free,
+        mesh=file_mesh(problem, (best or free.theta_best) if given == "auto" else float(given), progress),
     )
 
 

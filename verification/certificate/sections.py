@@ -147,7 +147,7 @@ def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list
     if found.energy is None:
         said.append(f"Nothing is proved for any particular theta. {document['reason']['rho']}.")
     elif document["interval"] is None:
-        said.append(f"At {name} = {k:g} no theta is proved to contract: no conclusion.")
+        said.append(f"At {name} = {k:g} no theta is proved to contract in energy norms.")
     else:
         lo, hi = document["interval"][0], "1"
         if found.energy.interval != (0.0, 1.0):
@@ -157,7 +157,23 @@ def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list
         if document["factor"] is not None:
             said.append(f"theta = {document['theta']:g}: factor {_at_most(document['factor'])}, guaranteed.")
         elif document["theta"] is not None:
-            said.append(f"theta = {document['theta']:g}: no conclusion.")
+            said.append(f"theta = {document['theta']:g}: no conclusion in energy norms.")
+    return [*said, *_in_a_free_norm(name, k, document["free_norm"])]
+
+
+def _in_a_free_norm(name: str, k: float, free: Mapping[str, Any]) -> list[str]:
+    """The numbers in a norm that the proof chooses."""
+    threshold, top, factor = free["friction_threshold"], free["theta_max"], free["factor"]
+    if threshold is None:
+        return []
+    most = _few(threshold["lo"], False)
+    said = [f"In a norm that the proof chooses every small theta contracts for {name} < {most}."]
+    if top is not None:
+        here = f"There, at {name} = {k:g}: every theta <= {_few(top['lo'], False)}"
+        here += "" if factor is None else f"; the file's theta by a factor {_at_most(factor)}"
+        if free["theta_best"] is not None:
+            here += f"; theta = {free['theta_best']:.3f} by {_at_most(free['factor_best'])}"
+        said.append(f"{here}, guaranteed.")
     return said
 
 

@@ -8,7 +8,7 @@ finds the largest.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 from scipy.optimize import brentq, minimize_scalar
 
 from fem1d2d.mesh import Floats
-from ndtheory.continuum.circle import Multipliers, Symmetric, TwoLayers, disk, flexibility, pencil
+from ndtheory.continuum.circle import Multipliers, Pencil, Symmetric, TwoLayers, disk, flexibility, pencil
 from ndtheory.continuum.strip import Strip, symbols
 from verification.semidefinite.interior_point import Program, solve
 
@@ -63,6 +63,8 @@ class Search:
 
     def __init__(self, layers: TwoLayers) -> None:
         self.layers = layers
+        #: Decides multipliers in intervals: its ``contracts(ends, by)``.
+        self.criterion: Any = layers
         depths = [float(strip.thickness) for strip in (layers.contact, layers.neumann)]
         radius = float(layers.radius)
         long, short = 1 / max(depths), 1 / min(*depths, radius)
@@ -78,25 +80,25 @@ class Search:
         none = Allowed(-1.0, Multipliers(normal=1.0, alpha=0.0, beta=0.0))
         if min(float((self.contact[0] + x * self.neumann[0]).min()) for x in ends) <= 0:
             return none
-        centre, widths = np.array([0.0, -1.5]), np.array(WIDTHS)
-        for _ in range(TIMES):
-            axes = [np.linspace(c - w, c + w, n) for c, w, n in zip(centre, widths, GRID, strict=True)]
-            normal, beta = np.exp(axes[0])[:, None], np.exp(np.minimum(axes[1], 0))[None, :] / along
-            alpha = self.largest_alpha(ends, normal, beta)
-            value = 4 * alpha * beta
-            best = value if value.max() > 0 else alpha  # nothing is allowed yet: where the least is missing
-            i, j = np.unravel_index(int(best.argmax()), best.shape)
-            centre = np.array([axes[0][i], min(axes[1][j], 0.0)])
-            widths = widths * DRAWN_IN
-        if value[i, j] <= 0:
+
+        def at(normal: Floats, beta: Floats) -> tuple[Floats, Floats]:
+            beta = np.exp(beta) / along
+            return self.largest_alpha(ends, np.exp(normal), beta), beta
+
+        normal, beta = drawn_in(at, (0.0, -1.5), WIDTHS, GRID, ((-np.inf, np.inf), (-np.inf, 0.0)))
+        alpha, beta = at(normal, beta)
+        if alpha <= 0:
             return none
-        by = Multipliers(normal=float(normal[i, 0]), alpha=float(alpha[i, j]), beta=float(beta[0, j]))
-        return Allowed(float(np.sqrt(value[i, j])), by)
+        by = Multipliers(normal=float(np.exp(normal)), alpha=float(alpha), beta=float(beta))
+        return Allowed(float(np.sqrt(4 * alpha * beta)), by)
 
     def largest_alpha(self, ends: tuple[float, float], normal: Floats, beta: Floats) -> Floats:
         """The largest alpha for which M is positive semidefinite at all wave numbers; -inf without one."""
         by = Multipliers(normal=normal[..., None], alpha=0.0, beta=beta[..., None])
-        form = pencil(self.contact, self.neumann, by, 0.0, ends)
+        return self.alpha_of(pencil(self.contact, self.neumann, by, 0.0, ends), ends)
+
+    def alpha_of(self, form: Pencil, ends: tuple[float, float]) -> Floats:
+        """The largest alpha with which a form without one stays positive semidefinite at all wave numbers, or -inf."""
         low, high = form.low[0], form.high[0]
         # the determinant falls by alpha times these, in Bernstein's form too
         x, y = ends
@@ -188,6 +190,26 @@ def _matrices(form: Symmetric) -> Floats:
     """Symmetric matrices of two rows, one for each wave number."""
     along, across, mixed = form
     return np.array([[along, mixed], [mixed, across]]).transpose(2, 0, 1)
+
+
+def drawn_in(
+    at: Callable[..., tuple[Floats, Floats]],
+    centre: Sequence[float],
+    widths: Sequence[float],
+    points: Sequence[int],
+    limits: Sequence[tuple[float, float]],
+) -> list[Floats]:
+    """The point with the largest product of alpha and beta, on grids that are drawn in on their best point."""
+    for _ in range(TIMES):
+        axes = [
+            np.linspace(c - w, c + w, n).clip(*limit)
+            for c, w, n, limit in zip(centre, widths, points, limits, strict=True)
+        ]
+        alpha, beta = at(*np.meshgrid(*axes, indexing="ij", sparse=True))
+        best = alpha * beta if alpha.max() > 0 else alpha  # nothing is allowed yet: where the least is missing
+        centre = [axis[i] for axis, i in zip(axes, np.unravel_index(int(best.argmax()), best.shape), strict=True)]
+        widths = [DRAWN_IN * width for width in widths]
+    return [np.asarray(c) for c in centre]
 
 
 def least_ratio(over: tuple[Any, Any, Any], under: tuple[Any, Any, Any]) -> Floats:

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
 from ndtheory import HypothesisError, Number
 from ndtheory.constants import relaxation_factor, take
-from ndtheory.continuum.circle import Multipliers, TwoLayers, disk
+from ndtheory.continuum.circle import TwoLayers
 from ndtheory.continuum.strip import Strip
 from ndtheory.keys import Key, Part, key, says
 from ndtheory.moduli import Moduli
-from ndtheory.number import above, below
 from verification.document import Document
+from verification.free_norm.numbers import Found, numbers, proved, with_friction
 from verification.free_norm.search import Search
 from verification.semidefinite.interior_point import LMIError
-
-#: By these shares factors are larger, and frictions and thetas smaller, until intervals decide.
-MARGINS = (2e-4, 1e-3, 3e-3, 8e-3, 1.6e-2)
-
-#: Shares of beta at which a proof is tried: at the largest one the form has a zero.
-INSIDE = (1.0, 0.98)
 
 #: Layers, radii and stiffnesses whose ratios are larger than this are refused.
 RATIO = 10**6
@@ -164,57 +158,19 @@ def _pair(name: str, pair: Any) -> tuple[Any, Any]:
 
 
 def _role(number: int, search: Search, k: Fraction, theta: Fraction | None, verified: bool) -> LayersRole:
-    friction, layers = float(k), search.layers
-
-    def found(value: float, side: int, holds: Callable[[Fraction], bool]) -> Number:
-        """A number, above which (side 1) or below which (-1) something holds."""
-        return _proved(value, side, holds) if verified else Number.of_float(value)
-
-    def holds(ends: tuple[Fraction, Fraction], k: Fraction = k) -> bool:
-        allowed = search.allowed((float(ends[0]), float(ends[1])))
-        inside = (replace(allowed.by, beta=share * allowed.by.beta) for share in INSIDE)
-        return allowed.friction > k and any(layers.contracts(ends, _with_friction(by, k)) for by in inside)
-
-    def factor(theta: Fraction, q: float) -> Number:
-        return found(q, 1, lambda value: holds(disk(theta, value)))
-
-    known: dict[str, Any] = {}
-    if (largest := search.largest_theta(friction)) is not None:
-        known["theta_max"] = found(largest, -1, lambda value: holds(disk(value, Fraction(1))))
-        best, least = search.best_theta(friction, largest)
-        known |= {"theta_best": best, "factor_best": factor(Fraction(best), least)}
-        theta = Fraction(best).limit_denominator(10**4) if theta is None else theta
+    found: Found = proved if verified else lambda value, side, holds: Number.of_float(value)
+    known = numbers(search, k, theta, found)
+    if theta is None and "theta_best" in known:
+        theta = Fraction(known["theta_best"]).limit_denominator(10**4)
     energy = None
     if theta is not None:
-        if (q := search.factor(float(theta), friction)) is not None:
-            known["factor"] = factor(theta, q)
         with suppress(LMIError):  # no multipliers at all
-            q, by, weight = search.energy_factor(float(theta), friction)
-            exact = _with_friction(by, k), Fraction(weight)
-            energy = found(q, 1, lambda value: layers.contracts_in_energy(theta, value, *exact))
-    threshold = found(search.friction_threshold, -1, lambda value: holds((Fraction(0), Fraction(1)), value))
+            q, by, weight = search.energy_factor(float(theta), float(k))
+            exact = with_friction(by, k), Fraction(weight)
+            energy = found(q, 1, lambda value: search.layers.contracts_in_energy(theta, value, *exact))
     return LayersRole(
         neumann=number,
         theta=None if theta is None else float(theta),
         energy=EnergyOfLayers(factor=energy),
-        lyapunov=FreeNorm(friction_threshold=threshold, friction_limit=threshold, **known),
+        lyapunov=FreeNorm(friction_limit=known["friction_threshold"], **known),
     )
-
-
-def _with_friction(by: Multipliers, k: Fraction) -> Multipliers:
-    """Rational multipliers near some in doubles, with ``4 alpha beta = k^2``."""
-    beta = Fraction(by.beta)
-    return Multipliers(normal=Fraction(by.normal), alpha=k**2 / (4 * beta), beta=beta)
-
-
-def _proved(value: float, side: int, holds: Callable[[Fraction], bool]) -> Number:
-    """The nearest of some numbers beside one, above it (side 1) or below it (-1), for which something is proved.
-
-    The number in doubles where it is proved for none.
-    """
-    for margin in MARGINS:
-        moved = Fraction(value * (1 + side * margin))
-        if holds(moved):
-            end = above(moved) if side > 0 else below(moved)
-            return Number(value=end, **{"hi" if side > 0 else "lo": end}, level="guaranteed")
-    return Number.of_float(value)
