@@ -167,6 +167,7 @@ def continuum() -> Numbers:
     return values(document["constants"], "rho", "rho_normal", "C_s", "C_t1", "C_t2", "kappa_1", "kappa_2") | {
         "friction_threshold": document["friction_threshold"]["value"],
         "theta_max": document["theta_max_proved"]["value"],
+        "free": values(document["free_norm"], "friction_threshold", "factor"),
     }
 
 

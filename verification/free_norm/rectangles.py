@@ -17,7 +17,7 @@ from ndtheory.keys import Part, key
 from verification.free_norm.numbers import numbers, proved
 from verification.free_norm.search import LEAST, Allowed, Search, drawn_in
 
-#: Points of the grid of beta and nu, and its first half widths: of the logarithms of beta and of nu/|x_1| - 1.
+#: Points of the grid of beta and nu, and its first half widths: of the logarithms of beta and of nu over -x_1 - 1.
 GRID, WIDTHS = (9, 9), (2.0, 4.0)
 
 #: Limits of these logarithms.  That of beta is 0 where b has a zero; near it a proof in intervals takes long.
