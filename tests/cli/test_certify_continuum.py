@@ -1,6 +1,7 @@
 """ndtheory certify --continuum: what it proves, what it refuses, what it says it cannot prove."""
 
 import pytest
+from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory import evaluate_energy
@@ -69,6 +70,7 @@ def test_where_gamma_c_reaches_an_end_small_theta_are_proved_and_none_in_numbers
     assert "rho >= 19.26 wedges at the ends of Gamma_c" in said
 
 
+@pytest.mark.skipif(not AT_NIGHT, reason="ten seconds and more: by night")
 def test_the_mesh_enters_no_bound(call, write):
     coarse, fine = (
         call("certify", "--continuum", write({"body1.cells": cells}), "--theta", "0.4", "--json").document
@@ -119,6 +121,7 @@ def test_the_best_theta_of_the_continuum_is_judged_where_the_file_has_none(call,
     assert mesh["contracts"] is False
 
 
+@pytest.mark.skipif(not AT_NIGHT, reason="ten seconds and more: by night")
 def test_rho_of_the_mesh_is_that_of_constants_and_the_mesh_is_judged_by_its_own_bound(call, write):
     path = write({"contact.radius": "0.2"})
     mesh = call("certify", "--continuum", path, "--theta", "0.3", "--json").document["mesh"]
@@ -138,6 +141,7 @@ def test_rho_of_the_mesh_is_that_of_constants_and_the_mesh_is_judged_by_its_own_
     assert call("certify", "--continuum", stiff, "--theta", "0.5", "--json").document["mesh"]["contracts"] is False
 
 
+@pytest.mark.skipif(not AT_NIGHT, reason="ten seconds and more: by night")
 @pytest.mark.parametrize(
     ("edits", "why"),
     [
