@@ -14,7 +14,7 @@ from ndtheory.number import Numeric, above
 from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, rest_of, trace
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
-from verification.semidefinite import LARGEST
+from verification.semidefinite.bound import pair_of
 
 if TYPE_CHECKING:
     from verification.algorithm.rates import ForceNorm
@@ -74,12 +74,15 @@ class FreeNormBound(Bound):
     apart = on_request = certifies = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
-        pair, measured = subject.pair, subject.measured
-        if theta is None or pair is None or measured is None:
-            return self.absent("needed a pair of bodies and a theta")
-        if pair.contact.grid.n > LARGEST:
-            return self.absent(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
         from verification.semidefinite.interior_point import LMIError
+
+        needed = "needed a pair of bodies and a theta"
+        if theta is None:
+            return self.absent(needed)
+        try:
+            _, measured = pair_of(subject, needed)
+        except NotComputed as error:
+            return self.absent(str(error))
 
         chosen = relaxation_factor(theta)
         try:
@@ -135,11 +138,7 @@ class FreeNormBound(Bound):
         return (f"{self.name}: in a norm between (5.21) and {root:.3g} times (5.21), not in (5.21) itself", said)
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
-        pair, measured = subject.pair, subject.measured
-        if pair is None or measured is None or measured.friction_threshold is None:
-            raise NotComputed("needed a pair of bodies with a law of friction")
-        if pair.contact.grid.n > LARGEST:
-            raise NotComputed(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+        pair, measured = pair_of(subject, "needed a pair of bodies with a law of friction", law=True)
         from verification.free_norm.norm import FreeNorm
         from verification.semidefinite.interior_point import LMIError
 

@@ -21,7 +21,19 @@ import numpy as np
 from fem1d2d.layers import FacingLayers
 from fem1d2d.mesh import Floats
 from ndtheory.continuum.circle import disk
-from verification.free_norm.circle import BETWEEN, INSIDE, LOOKS, NOTHING, START, STOP, Complex, Ends, real_rows
+from verification.free_norm.circle import (
+    BETWEEN,
+    INSIDE,
+    LOOKED_AT,
+    LOOKS,
+    NOTHING,
+    START,
+    STOP,
+    Complex,
+    Ends,
+    point,
+    real_rows,
+)
 from verification.interface.friction import hat
 from verification.machine.threads import one_thread
 from verification.semidefinite.interior_point import LMIError, Program, solve
@@ -88,9 +100,7 @@ class CellCircles:
 
     def find(self, ends: Ends) -> Floats | None:
         """lambda, tau, a and b of the nodes in one period with which M > 0 on the circle with some ends, or None."""
-        (low, high), N = ends, self.N
-        u = np.sin(np.linspace(0, np.pi / 2, LOOKS)) ** 2
-        half = low + u * (high - low) + 1j * (high - low) * np.sqrt(u * (1 - u))
+        half, N = point(ends, LOOKED_AT), self.N
         h = np.concatenate([half, half.conj()])[:, None, None, None]
         left, right = (h * of_g + of_p for of_g, of_p in (self._left, self._right))
         at, nodes = list(self._at), np.arange(N)
@@ -115,8 +125,8 @@ class CellCircles:
             if values.min() >= -BETWEEN * found.s:
                 self._at = at  # circles nearby need the same
                 return found.y
-            point, phase = np.unravel_index(int(values.argmin()), values.shape)
-            at.append((int(point), int(phase)))
+            place, phase = np.unravel_index(int(values.argmin()), values.shape)
+            at.append((int(place), int(phase)))
         return None
 
     @one_thread()

@@ -31,6 +31,9 @@ from verification.semidefinite.multipliers import QuadraticForms
 #: Points of a half circle at which M is looked at; those that a program begins with, and the most that it has.
 LOOKS, KEPT, MOST = 17, 3, 6
 
+#: The first ones, by the share of the ends that their real parts have.
+LOOKED_AT = np.sin(np.linspace(0, np.pi / 2, LOOKS)) ** 2
+
 #: A program has another point where M is smaller there than at its own points by this share.
 BETWEEN = 0.2
 
@@ -140,7 +143,7 @@ class Circles:
     def _on(self, ends: Ends, at: list[float]) -> Program:
         """The program that maximises the least eigenvalue of M at some points of a circle."""
         columns, sizes = [], []
-        for h in (_point(ends, u) for u in at):
+        for h in (point(ends, u) for u in at):
             for both in self._parts:
                 rows = [h * of_g + of_p for of_g, of_p in both]
                 columns.append([real_rows(r) if h.imag else np.vstack([r.real, 0 * r.real]) for r in rows])
@@ -152,7 +155,7 @@ class Circles:
         program = replace(
             self._program, fixed=np.zeros((size, size)), free=np.eye(size), left=left, right=right, blocks=blocks
         )
-        least = min(float(np.linalg.eigvalsh(form)[0]) for u in at for form in self._forms(_point(ends, u), program.y))
+        least = min(float(np.linalg.eigvalsh(form)[0]) for u in at for form in self._forms(point(ends, u), program.y))
         return replace(program, s=1 + abs(least) - least)
 
     def _forms(self, h: complex, y: Floats) -> Iterator[Complex]:
@@ -166,8 +169,8 @@ class Circles:
 
     def _least(self, ends: Ends, y: Floats) -> tuple[float, float]:
         """The least eigenvalue of M among the points looked at, and where it is."""
-        at = np.sin(np.linspace(0, np.pi / 2, LOOKS)) ** 2
-        low, middle, high = (list(self._forms(_point(ends, u), y)) for u in (0.0, 0.5, 1.0))
+        at = LOOKED_AT
+        low, middle, high = (list(self._forms(point(ends, u), y)) for u in (0.0, 0.5, 1.0))
         values = np.full(len(at), np.inf)
         u = at[:, None, None]
         for a, m, b in zip(low, middle, high, strict=True):
@@ -177,10 +180,10 @@ class Circles:
         return float(values.min()), float(at[np.argmin(values)])
 
 
-def _point(ends: Ends, u: float) -> complex:
-    """The point h of the upper half of a circle whose real part divides its ends as u does."""
+def point(ends: Ends, u: Any) -> Any:
+    """The point h of the upper half of a circle whose real part divides its ends as u does, or several."""
     low, high = ends
-    return complex(low + u * (high - low), (high - low) * np.sqrt(u * (1 - u)))
+    return low + u * (high - low) + 1j * (high - low) * np.sqrt(u * (1 - u))
 
 
 def _reached(rows: Floats, kinds: Indices) -> Floats:

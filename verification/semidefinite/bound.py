@@ -12,12 +12,29 @@ from verification.registry import BOUNDS
 from verification.semidefinite import LARGEST
 
 if TYPE_CHECKING:
+    from verification.constants import Measured
     from verification.interface.pair import ContactPair
     from verification.semidefinite.lipschitz import Enclosure
     from verification.semidefinite.multipliers import QuadraticForms
 
 #: Friction values that trace the border of the region, at most.
 TRACED = 25
+
+
+def pair_of(subject: Subject, needed: str, *, law: bool = False) -> tuple[ContactPair, Measured]:
+    """The pair of a subject and its constants, where it is small enough for programs.
+
+    Raises
+    ------
+    NotComputed
+        Without a pair, with ``law`` also without a law of friction: ``needed``; with more than LARGEST nodes.
+    """
+    pair, measured = subject.pair, subject.measured
+    if pair is None or measured is None or (law and measured.friction_threshold is None):
+        raise NotComputed(needed)
+    if pair.contact.grid.n > LARGEST:
+        raise NotComputed(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+    return pair, measured
 
 
 class SemidefiniteBound(Bound):
@@ -30,23 +47,26 @@ class SemidefiniteBound(Bound):
     apart = certifies = divides = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
-        if theta is None or subject.pair is None or subject.measured is None:
-            return self.absent("needed a pair of bodies and a theta")
-        if subject.pair.contact.grid.n > LARGEST:
-            return self.absent(f"{subject.pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
         from verification.semidefinite.interior_point import LMIError
         from verification.semidefinite.lipschitz import work_out
 
+        needed = "needed a pair of bodies and a theta"
+        if theta is None:
+            return self.absent(needed)
+        try:
+            pair, measured = pair_of(subject, needed)
+        except NotComputed as error:
+            return self.absent(str(error))
         chosen = relaxation_factor(theta)
         theta = float(chosen)
         try:
-            found = work_out(subject.pair, subject.measured, theta, exact=subject.exact, progress=progress)
+            found = work_out(pair, measured, theta, exact=subject.exact, progress=progress)
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
-        if subject.measured.unverified is not None:  # proofs were asked for
-            found = found.proved(subject.pair, subject.measured, chosen, progress=progress)
+        if measured.unverified is not None:  # proofs were asked for
+            found = found.proved(pair, measured, chosen, progress=progress)
         factor, allowed, largest = found.factor, found.friction_threshold, found.theta_max
-        on = "k" if allowed is not None or subject.measured.C_t1 is None else "any"
+        on = "k" if allowed is not None or measured.C_t1 is None else "any"
         return BoundResult(
             name=self.name,
             proved=True,
@@ -86,11 +106,7 @@ class SemidefiniteBound(Bound):
         from verification.semidefinite.interior_point import LMIError
         from verification.semidefinite.lipschitz import thetas
 
-        pair, measured = subject.pair, subject.measured
-        if pair is None or measured is None or measured.friction_threshold is None:
-            raise NotComputed("needed a pair of bodies with a law of friction")
-        if pair.contact.grid.n > LARGEST:
-            raise NotComputed(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+        pair, measured = pair_of(subject, "needed a pair of bodies with a law of friction", law=True)
         try:
             last, largest = thetas(pair, measured, progress=progress)
             interval = lambda k: None if (end := largest(k)) is None else (0.0, end)
