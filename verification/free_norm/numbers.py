@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from ndtheory import Number
 from ndtheory.continuum.circle import Multipliers, disk
+from ndtheory.continuum.rectangle_circle import SMALL_THETAS
 from ndtheory.number import above, below
 from verification.free_norm.search import Search
 
@@ -48,8 +49,7 @@ def numbers(search: Search, k: Fraction, theta: Fraction | None, found: Found) -
         theta = Fraction(best).limit_denominator(10**4) if theta is None else theta
     if theta is not None and (q := search.factor(float(theta), float(k))) is not None:
         known["factor"] = factor(theta, q)
-    small = (Fraction(0), Fraction(1))
-    known["friction_threshold"] = found(search.friction_threshold, -1, lambda value: holds(small, value))
+    known["friction_threshold"] = found(search.friction_threshold, -1, lambda value: holds(SMALL_THETAS, value))
     return known
 
 
