@@ -88,25 +88,9 @@ def evidence(shared):
 @pytest.fixture
 def known_continuum(monkeypatch, shared):
     """Calibrations of one body, constants of two, and what a proof in a free norm decides, are computed once."""
-    from ndtheory.continuum.rectangle_circle import RectangleCircle
-    from verification.certificate import continuum
-    from verification.free_norm.rectangles import RectangleSearch
+    from known import continuum_once
 
-    for name in ("for_traces", "for_cut_off", "bounded"):
-        compute = getattr(continuum, name)
-        known = lambda *given, name=name, compute=compute: shared((name, *given), lambda: compute(*given))
-        monkeypatch.setattr(continuum, name, known)
-    contracts, best = RectangleCircle.contracts, RectangleSearch.best_theta
-    monkeypatch.setattr(
-        RectangleCircle,
-        "contracts",
-        lambda own, *given: shared(("contracts", own, *given), lambda: contracts(own, *given)),
-    )
-    monkeypatch.setattr(
-        RectangleSearch,
-        "best_theta",
-        lambda own, *given: shared(("best theta", own.circle, *given), lambda: best(own, *given)),
-    )
+    continuum_once(monkeypatch, shared)
 
 
 @pytest.fixture

@@ -1,15 +1,19 @@
-"""Bounds of one pair of bodies, and one run repeated by cvxpy, are computed once for all processes of a session."""
+"""Bounds of one pair of bodies, proofs in the continuum, and one run repeated by cvxpy: once in a session."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from shared import Shared
 
+from ndtheory.continuum.rectangle_circle import RectangleCircle
 from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
+from verification.certificate import continuum
 from verification.constants import Measured
+from verification.free_norm.rectangles import RectangleSearch
 from verification.interface.pair import ContactPair
 from verification.semidefinite import lipschitz, losses, multipliers
 
@@ -47,3 +51,20 @@ def repeated_once(repeat: Callable[[Run], Reference], shared: Shared) -> Callabl
         return shared(key, lambda: repeat(run))
 
     return answer
+
+
+def continuum_once(patch: pytest.MonkeyPatch, shared: Shared) -> None:
+    """Keep calibrations of one body, constants of two, and what a proof in a free norm decides."""
+
+    def keep(owner: Any, name: str, of: Callable[[Any], object] = lambda own: own) -> None:
+        compute = getattr(owner, name)
+
+        def answer(first: Any, *given: Any) -> Any:
+            return shared((name, of(first), *given), lambda: compute(first, *given))
+
+        patch.setattr(owner, name, answer)
+
+    for name in ("for_traces", "for_cut_off", "bounded"):
+        keep(continuum, name)
+    keep(RectangleCircle, "contracts")
+    keep(RectangleSearch, "best_theta", lambda search: search.circle)

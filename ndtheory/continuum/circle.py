@@ -21,6 +21,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
+from typing import Self
 
 from ndtheory.continuum.intervals import Interval
 from ndtheory.continuum.strip import Part, Strip, everywhere, smooth, times_smooth
@@ -59,7 +61,7 @@ class Multipliers:
     beta: Scalar
 
     @property
-    def enclosed(self) -> Multipliers:
+    def enclosed(self) -> Self:
         """The same as intervals."""
         return replace(self, **{name: Interval.of(value) for name, value in vars(self).items()})
 
@@ -192,13 +194,20 @@ class TwoLayers:
 
         Times xi where both layers are thick beside the waves.
         """
-        long = part[0] * min(self.contact.thickness, self.neumann.thickness) >= 1
-        contact = flexibility(_stiffness(self.contact, part, over=long), side=-1)
-        neumann = flexibility(_stiffness(self.neumann, part, over=long), side=1)
-        if not long:
-            return contact, neumann, by, smooth(part, self.radius)
-        fading = Interval.between(0 if part[1] is None else 1 / part[1], 1 / part[0])
-        return contact, neumann, replace(by, beta=by.beta * fading), times_smooth(part, self.radius)
+        contact, neumann, smoothed, fading = _forms(self, part)
+        return contact, neumann, by if fading is None else replace(by, beta=by.beta * fading), smoothed
+
+
+#: Flexibilities, square of the smoothing, and 1/xi where they are times xi, on parts that several proofs ask for.
+@lru_cache(maxsize=2**14)
+def _forms(layers: TwoLayers, part: Part) -> tuple[Symmetric, Symmetric, Interval, Interval | None]:
+    long = part[0] * min(layers.contact.thickness, layers.neumann.thickness) >= 1
+    contact = flexibility(_stiffness(layers.contact, part, over=long), side=-1)
+    neumann = flexibility(_stiffness(layers.neumann, part, over=long), side=1)
+    if not long:
+        return contact, neumann, smooth(part, layers.radius), None
+    fading = Interval.between(0 if part[1] is None else 1 / part[1], 1 / part[0])
+    return contact, neumann, times_smooth(part, layers.radius), fading
 
 
 def energy_form(

@@ -66,10 +66,15 @@ class Interval:
 
     def __mul__(self, other: Any) -> Interval:
         o = Interval.of(other)
-        if self.lo >= 0 and o.lo >= 0:
-            return Interval(_down.multiply(self.lo, o.lo), _up.multiply(self.hi, o.hi))
-        pairs = [(a, b) for a in (self.lo, self.hi) for b in (o.lo, o.hi)]
-        return Interval(min(_down.multiply(a, b) for a, b in pairs), max(_up.multiply(a, b) for a, b in pairs))
+        if not self.lo.is_signed():  # the signs of the other ends decide
+            lo, hi = (self.hi if o.lo.is_signed() else self.lo), (self.lo if o.hi.is_signed() else self.hi)
+            return Interval(_down.multiply(lo, o.lo), _up.multiply(hi, o.hi))
+        if self.hi.is_signed():
+            return -(-self * o)
+        if o.lo.is_signed() == o.hi.is_signed():
+            return o * self
+        pairs = [(self.lo, o.hi), (self.hi, o.lo)], [(self.lo, o.lo), (self.hi, o.hi)]
+        return Interval(min(_down.multiply(*ends) for ends in pairs[0]), max(_up.multiply(*ends) for ends in pairs[1]))
 
     def __truediv__(self, other: Any) -> Interval:
         o = Interval.of(other)

@@ -84,6 +84,13 @@ class RectangleCircle:
             cut_off=constants.cut_off,
         )
 
+    @property
+    def enclosed(self) -> RectangleCircle:
+        """The same with its bounds as intervals."""
+        first, second = (Interval.of(bound) for bound in (self.C_t1_square, self.C_t2_square))
+        cut_off = None if self.cut_off is None else Interval.of(self.cut_off)
+        return replace(self, C_t1_square=first, C_t2_square=second, cut_off=cut_off)
+
     def contracts(self, ends: tuple[Fraction, Fraction], by: RectangleMultipliers) -> bool:
         """True if the criterion is proved at every wave number, on the circle with some ends.
 
@@ -95,12 +102,12 @@ class RectangleCircle:
         any_theta = low < 0 < high and by.nu > -low and self.cut_off is not None
         if not (small or any_theta) or not 0 <= by.mu <= 1 or by.normal != 1:
             return False
-        sigma = max(x**2 / (x + by.nu) for x in ends if x)
-        circle = (Interval.of(low), Interval.of(high))
+        sigma = Interval.of(max(x**2 / (x + by.nu) for x in ends if x))
+        circle, enclosed, own = (Interval.of(low), Interval.of(high)), by.enclosed, self.enclosed
 
         def holds(given: Enclosed) -> bool:
-            slack = self.slack(given[0][0], given[1][0], given[2].beta, by, sigma)
-            return slack.lo > 0 and definite(self.pencil(*given, circle, slack, by.nu))
+            slack = own.slack(given[0][0], given[1][0], given[2].beta, enclosed, sigma)
+            return slack.lo > 0 and definite(own.pencil(*given, circle, slack, enclosed.nu))
 
         return self.layers.everywhere(by, holds)
 

@@ -193,7 +193,7 @@ def test_bars_are_refused(call, tmp_path):
 
 def test_a_certificate_of_the_continuum_is_refused_by_the_check_of_those_of_meshes(call, write, tmp_path):
     target = tmp_path / "continuum.json"
-    call("certify", "--continuum", write({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}), "-o", target)
+    call("certify", "--continuum", write({"contact.radius": "0.1"}), "-o", target)
     complaint = call("certify", "--check", target).complaint
     assert "of the continuum" in complaint
     assert "KeyError" not in complaint

@@ -17,7 +17,7 @@ import meshio
 import numpy as np
 import pytest
 from coupling_logs import linear_run, precice
-from known import DEAR, once, repeated_once
+from known import DEAR, continuum_once, once, repeated_once
 from made_up import Halfway
 from shared import Shared
 
@@ -126,14 +126,14 @@ class Reader:
 @pytest.fixture(scope="module", autouse=True)
 def sketched(shared: Shared, evidence: Callable[[str], Any]) -> Iterator[None]:
     """Pictures that cost nothing and few runs in the plane, as no key depends on them; what is dear is shared."""
-    searched, bounded = "inequalities on random problems", continuum.bounded
+    searched = "inequalities on random problems"
     found: dict[str, list[Evidence]] = evidence(searched)[0]
 
     with pytest.MonkeyPatch.context() as patch:
         for module, name in DEAR:
             patch.setattr(module, name, once(getattr(module, name), shared))
         patch.setattr(comparison, "by_cvxpy_alone", repeated_once(comparison.by_cvxpy_alone, shared))
-        patch.setattr(continuum, "bounded", lambda model: shared(("continuum", model), lambda: bounded(model)))
+        continuum_once(patch, shared)
         patch.setitem(SOURCES, searched, lambda ids, *_: {id: found[id] for id in ids if id in found})
         for name in ("draw_bodies", "draw_residuals", "draw_waterfall", "draw_region"):
             patch.setattr(figures, name, lambda *args, **options: None)

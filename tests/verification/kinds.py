@@ -79,7 +79,7 @@ KINDS: dict[str, Callable[[vf.Problem], object]] = {
     "Advice": vf.advise,
     "Certificate": vf.certify,
     "Checked": lambda given: vf.check_again(vf.certify(given).to_dict()),
-    "ContinuumCertificate": certify_continuum,
+    "ContinuumCertificate": lambda given: certify_continuum(given.changed(radius="0.1")),
     "Plane": a_plane,
     "Sweep": lambda given: vf.sweep(given, theta=["0.3", "0.5"], friction=[0.1]),
 }

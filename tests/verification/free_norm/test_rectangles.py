@@ -5,12 +5,14 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
+from known import continuum_once
 from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory.continuum.circle import disk
 from ndtheory.continuum.rectangle_circle import RectangleCircle
-from ndtheory.continuum.rectangles import continuum_constants, friction_threshold
+from ndtheory.continuum.rectangles import friction_threshold
+from verification.certificate import continuum
 from verification.certificate.continuum import two_rectangles
 from verification.free_norm.numbers import with_friction
 from verification.free_norm.rectangles import RectangleSearch, rectangle_norm
@@ -18,23 +20,22 @@ from verification.free_norm.rectangles import RectangleSearch, rectangle_norm
 MODEL = two_rectangles(vf.example("section6").changed(radius="0.1"))
 EXCHANGED = replace(MODEL, contact=MODEL.neumann, neumann=MODEL.contact)
 
-#: The bounds of the certificate, where calibrations are found; rounded up.
-FIRST, SECOND, EPS = F("5.7945e-5"), F("9.7244e-6"), F("0.42538")
 
-
-def calibrated(model, first, second, eps):
-    """The constants of a model with some bounds replaced; ``continuum_constants`` has the closed forms."""
-    return replace(continuum_constants(model), C_t1_square=first, C_t2_square=second, cut_off=eps)
-
-
-@pytest.fixture(scope="module")
-def own():
-    return calibrated(MODEL, FIRST, SECOND, EPS)
+@pytest.fixture(scope="module", autouse=True)
+def known(shared):
+    with pytest.MonkeyPatch.context() as patch:
+        continuum_once(patch, shared)
+        yield
 
 
 @pytest.fixture(scope="module")
-def exchanged():
-    return calibrated(EXCHANGED, SECOND, FIRST, None)
+def own(known):
+    return continuum.bounded(MODEL)
+
+
+@pytest.fixture(scope="module")
+def exchanged(known):
+    return continuum.bounded(EXCHANGED)
 
 
 @pytest.fixture(scope="module")
@@ -44,10 +45,7 @@ def search(own):
 
 @pytest.fixture(scope="module")
 def proved(own):
-    """At the theta that a search for the best one, of some seconds, finds."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(RectangleSearch, "best_theta", lambda search, k, largest: (0.754, search.factor(0.754, k)))
-        return rectangle_norm(MODEL, own, F("0.2"), F("0.7"))
+    return rectangle_norm(MODEL, own, F("0.2"), F("0.7"))
 
 
 def test_section_6_is_proved_beyond_the_energy_norms(proved, own):

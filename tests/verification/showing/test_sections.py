@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 from kinds import KINDS, OTHERS, problem
+from known import continuum_once
 from processes import ended
 
 import verification as vf
 from ndtheory import Number
 from verification import FILLS, registry
 from verification.bounds.bound import Bound, BoundResult, Thresholds
-from verification.certificate import continuum
 from verification.cli import main
 from verification.document import Document
 from verification.output.report import report
@@ -46,9 +46,8 @@ NO_FIGURES: dict[str, str] = {}
 
 @pytest.fixture(scope="module")
 def results(shared) -> dict[str, Document]:
-    bounded = continuum.bounded
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(continuum, "bounded", lambda model: shared(("continuum", model), lambda: bounded(model)))
+        continuum_once(patch, shared)
         return {name: make(problem(10)) for name, make in ALL.items()}
 
 
