@@ -200,6 +200,16 @@ def is_notebook(app: Sphinx, page: str) -> bool:
     return head.get("file_format") == "mystnb" and head.get("notebook") != "none"
 
 
+def keep_to_their_page(app: Sphinx, doctree: nodes.document) -> None:
+    """Let every node belong to the document of its page.
+
+    Those of ``{eval-rst}`` belong to a document of their own, whose settings hold everything that was read before: it
+    would be written out with each page again.
+    """
+    for node in doctree.findall():
+        node.document = doctree
+
+
 def name_of(page: str) -> str:
     """The file of its notebook, from the root of the site."""
     return f"notebooks/{page.rsplit('/', 1)[-1]}.ipynb"
@@ -246,6 +256,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("source-read", say_needs)
     app.add_node(gallery)
     app.add_directive("gallery", GalleryDirective)
+    app.connect("doctree-read", keep_to_their_page)
     app.connect("doctree-resolved", fill_galleries)
     app.connect("config-inited", write_widgets)
     app.connect("builder-inited", write_equations)

@@ -37,7 +37,7 @@ def test_every_label_that_is_referred_to_exists():
     assert set(re.findall(r"@([a-z][\w-]*)", SOURCE)) <= set(re.findall(r"<([\w-]+)>", SOURCE))
 
 
-def test_numbers_without_a_mesh_have_the_names_that_the_source_reads(compute):
+def test_numbers_without_a_mesh_have_the_names_that_the_source_reads(compute, known_continuum):
     found = compute.continuum()
     assert used("continuum") <= set(found)
     assert found["rho_normal"] == pytest.approx(2 / 7, rel=1e-12)  # E_c / E_n

@@ -42,10 +42,8 @@ def test_the_record_has_every_pair_at_every_friction(bench):
     assert CURVES["thetas"] == list(bench.GRID[1::2])
 
 
-DAILY = [("section-6-7", 0.4)]
-
-
-@pytest.mark.parametrize(("name", "k"), list(POINTS) if AT_NIGHT else DAILY)
+@pytest.mark.skipif(not AT_NIGHT, reason="seven seconds and more for each point: by night")
+@pytest.mark.parametrize(("name", "k"), list(POINTS))
 def test_best_thetas_are_found_again(bench, name, k):
     """By the whole search; a theta may move by one of the grid where the factor is flat."""
     known, found = POINTS[name, k], bench.point(bench.cases()[name], f"{k:g}")
@@ -94,7 +92,7 @@ def test_the_curves_agree_with_another_program(k):
 
 
 @pytest.mark.parametrize(
-    "at", CURVES["curves"] if AT_NIGHT else CURVES["curves"][1::3], ids=lambda at: f"k = {at['k']}"
+    "at", CURVES["curves"] if AT_NIGHT else CURVES["curves"][4:5], ids=lambda at: f"k = {at['k']}"
 )
 def test_curves_are_found_again(bench, at):
     case, thetas = bench.cases()[bench.SHOWN], CURVES["thetas"]
