@@ -13,6 +13,7 @@ from verification.coupling import methods, runs
 from verification.coupling.accelerated import Accelerated
 from verification.coupling.evidence import Evidence, Parallel
 from verification.coupling.kinds import BodyNumber
+from verification.coupling.layers import RoleOfLayers
 from verification.coupling.methods import Advised, MethodRow
 from verification.coupling.readings import LARGEST_TO_PASTE, NextRun, RunReading, rounded_down
 from verification.coupling.roles import Role, fewer, in_steps
@@ -211,6 +212,14 @@ class Advice(Document):
     def parallel(self) -> tuple[Parallel, ...]:
         possible = self.roles if self.evidence.kind.parallel else ()
         return tuple(Parallel.of(role) for role in possible if role.rho is not None)
+
+    @property
+    @says(
+        "for each role of a file of two rectangles that are held at their outer sides, with friction: what layers of "
+        "these depths without ends predict; empty elsewhere"
+    )
+    def layers(self) -> tuple[RoleOfLayers, ...]:
+        return self.evidence.layers
 
     @property
     @says("findings about the given matrices or operators", null="where none were", why="no matrices were given")

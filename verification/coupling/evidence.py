@@ -11,6 +11,7 @@ from ndtheory.energy_norms import parallel_factor, parallel_theta
 from ndtheory.keys import Part, key
 from verification.coupling import methods
 from verification.coupling.kinds import CONTACT, BodyNumber, Kind
+from verification.coupling.layers import RoleOfLayers
 from verification.coupling.methods import MethodRow
 from verification.coupling.readings import LARGEST_TO_PASTE, NextRun
 from verification.coupling.roles import Role, best_of, estimated
@@ -102,6 +103,11 @@ class Evidence(Part, ABC):
     def next_run(self) -> NextRun | None:
         """The run to make next; None where there is nothing to run."""
         return None
+
+    @property
+    def layers(self) -> tuple[RoleOfLayers, ...]:
+        """Predictions from layers without ends, one for each role; none where the bodies are not known."""
+        return ()
 
     @property
     def assumes(self) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from verification.coupling.advice import Advice
 from verification.coupling.cells import suggest
 from verification.coupling.evidence import Evidence
 from verification.coupling.kinds import kind_of
+from verification.coupling.layers import RoleOfLayers, of_layers
 from verification.coupling.roles import Role, plain_role, role_of, with_both_ends
 from verification.coupling.spectrum import Spectrum
 from verification.interface.assembly import SingularRole, TwoBodies
@@ -41,6 +43,13 @@ class FromProblem(Evidence):
     def spectra(self) -> tuple[Role, ...]:
         """The file's assignment first."""
         return self.roles
+
+    @cached_property
+    def layers(self) -> tuple[RoleOfLayers, ...]:
+        """For a problem file whose bodies may slip and open."""
+        if self.problem is None or self.kind.tied:
+            return ()
+        return tuple(of_layers(self.problem, self.friction or 0.0, self.roles))
 
 
 def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, progress: Progress = silent) -> Advice:

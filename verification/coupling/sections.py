@@ -306,7 +306,18 @@ def _friction(found: Advice) -> Iterator[Section]:
             said[name_of(found, role.neumann_body)] = allowed
     if set(said.values()) == {NO_LAW}:
         return
-    yield section("friction", "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?", *_together(said))
+    yield section("friction", "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?", *_together(said), *_layers(found))
+
+
+def _layers(found: Advice) -> Iterator[str]:
+    """The prediction by layers without ends, in one line for both roles."""
+    said = []
+    for role in found.layers:
+        factor = "none below 1" if role.factor is None else near_one(role.factor.value)
+        of = f"factor {factor} at {figures(role.theta)}, k < {figures(role.friction_threshold)}"
+        said.append(f"{name_of(found, role.neumann_body)}: {of}")
+    if said:
+        yield f"Predicted by layers without ends in a free norm: {'; '.join(said)}."
 
 
 def _together(said: Mapping[str, str]) -> list[str]:

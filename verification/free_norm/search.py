@@ -19,6 +19,7 @@ from scipy.optimize import brentq, minimize_scalar
 from fem1d2d.mesh import Floats
 from ndtheory.continuum.circle import Multipliers, Pencil, Symmetric, TwoLayers, disk, flexibility, pencil
 from ndtheory.continuum.strip import Strip, symbols
+from ndtheory.errors import HypothesisError
 from verification.semidefinite.interior_point import Program, solve
 
 #: Wave numbers of a search between two, by thickness and radius; and two at which nothing changes any more.
@@ -29,6 +30,9 @@ GRID, WIDTHS, DRAWN_IN = (11, 9), (7.0, 3.0), 0.45
 
 #: How often the grid is drawn in: 7 * 0.45^11 leaves 1e-3 of lambda, where the friction is flat.
 TIMES = 11
+
+#: Layers, radii and stiffnesses whose ratios are larger than this are refused.
+RATIO = 10**6
 
 #: How well factors and relaxation factors are known.
 NEAR = 1e-5
@@ -175,6 +179,16 @@ class Search:
     def friction_threshold(self) -> float:
         """The friction below which every small theta contracts, and above which none does by this criterion."""
         return self.allowed((0.0, 1.0)).friction
+
+
+def comparable(layers: TwoLayers) -> TwoLayers:
+    """The layers; HypothesisError where stiffnesses or lengths differ too much for doubles."""
+    both = (layers.contact, layers.neumann)
+    lengths = [*(strip.thickness for strip in both), layers.radius]
+    for name, values in (("young", [strip.body.shear for strip in both]), ("depth, radius", lengths)):
+        if max(values) > RATIO * min(values):
+            raise HypothesisError(name, ", ".join(str(float(value)) for value in values), f"ratios up to {RATIO:g}")
+    return layers
 
 
 def _layer(strip: Strip, xi: Floats, *, side: int) -> Symmetric:

@@ -16,11 +16,8 @@ from ndtheory.keys import Key, Part, key, says
 from ndtheory.moduli import Moduli
 from verification.document import Document
 from verification.free_norm.numbers import Found, numbers, proved, with_friction
-from verification.free_norm.search import Search
+from verification.free_norm.search import Search, comparable
 from verification.semidefinite.interior_point import LMIError
-
-#: Layers, radii and stiffnesses whose ratios are larger than this are refused.
-RATIO = 10**6
 
 #: The keys of what was given.
 INPUTS = {
@@ -139,12 +136,9 @@ def two_layers(
     depths = [take("depth", value, "a thickness > 0", lambda v: v > 0) for value in d]
     r = take("radius", radius, "a radius > 0", lambda v: v > 0)
     k = take("friction", friction, "a coefficient k > 0: without friction (5.21) is the best norm", lambda v: v > 0)
-    for name, values in (("young", [body.shear for body in bodies]), ("depth, radius", [*depths, r])):
-        if max(values) > RATIO * min(values):
-            raise HypothesisError(name, ", ".join(str(float(value)) for value in values), f"ratios up to {RATIO:g}")
     chosen = None if theta is None else Fraction(relaxation_factor(theta))
     neumann, contact = (Strip(body=body, thickness=depth) for body, depth in zip(bodies, depths, strict=True))
-    given = TwoLayers(contact=contact, neumann=neumann, radius=r)
+    given = comparable(TwoLayers(contact=contact, neumann=neumann, radius=r))
     first, second = (
         _role(number, Search(layers), k, chosen, verified) for number, layers in ((1, given), (2, given.swapped))
     )

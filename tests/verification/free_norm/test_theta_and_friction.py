@@ -91,9 +91,7 @@ def test_the_curves_agree_with_another_program(k):
         assert at[way][CURVES["thetas"].index(theta)] == pytest.approx(factor, rel=6e-3)
 
 
-@pytest.mark.parametrize(
-    "at", CURVES["curves"] if AT_NIGHT else CURVES["curves"][4:5], ids=lambda at: f"k = {at['k']}"
-)
+@pytest.mark.parametrize("at", CURVES["curves"] if AT_NIGHT else CURVES["curves"][4:5], ids=lambda at: f"k = {at['k']}")
 def test_curves_are_found_again(bench, at):
     case, thetas = bench.cases()[bench.SHOWN], CURVES["thetas"]
     some = thetas if AT_NIGHT else [thetas[round(13 * at["k"]) % len(thetas)]]
