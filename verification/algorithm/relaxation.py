@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import ClassVar, final
 
@@ -66,8 +66,16 @@ class Metric:
         return cls(lambda a, b: inner(pair, a, b), lambda columns: neumann.root.T @ neumann.flexibility(columns))
 
 
-#: The inner product of vectors of which nothing else is known.
-EUCLIDEAN = Metric(lambda a, b: float(a @ b), lambda columns: columns)
+def _dot(a: Floats, b: Floats) -> float:
+    return float(a @ b)
+
+
+def _as_they_are(columns: Floats) -> Floats:
+    return columns
+
+
+#: The inner product of vectors of which nothing else is known; of functions by name, so that it can be pickled.
+EUCLIDEAN = Metric(_dot, _as_they_are)
 
 
 class Rule(ABC):
@@ -195,20 +203,26 @@ class Aitken(OfVectors):
     words = "Aitken relaxation"
 
     def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
-        last: Floats | None = None
+        return AitkenStep(theta, metric)
 
-        def step(g: Floats, image: Floats) -> Floats:
-            nonlocal theta, last
-            r = image - g
-            if last is not None:
-                change = r - last
-                size = metric.inner(change, change)
-                if size > 0:
-                    theta *= -metric.inner(last, change) / size
-            last = r
-            return g + theta * r
 
-        return step
+@dataclass
+class AitkenStep:
+    """Aitken's factor, and the residual of the step before."""
+
+    theta: float
+    metric: Metric
+    last: Floats | None = None
+
+    def __call__(self, g: Floats, image: Floats) -> Floats:
+        r = image - g
+        if self.last is not None:
+            change = r - self.last
+            size = self.metric.inner(change, change)
+            if size > 0:
+                self.theta *= -self.metric.inner(self.last, change) / size
+        self.last = r
+        return g + self.theta * r
 
 
 @dataclass(frozen=True)
@@ -219,23 +233,30 @@ class Anderson(OfVectors):
     words = "Anderson mixing"
 
     def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
-        gs: deque[Floats] = deque(maxlen=DEPTH + 1)
-        rs: deque[Floats] = deque(maxlen=DEPTH + 1)
+        return AndersonStep(theta, metric)
 
-        def step(g: Floats, image: Floats) -> Floats:
-            r = image - g
-            gs.append(g)
-            rs.append(r)
-            following: Floats = g + theta * r
-            if len(gs) > 1:
-                coordinates = metric.coordinates(np.column_stack(rs))
-                changes = np.diff(coordinates, axis=1)
-                shares = np.linalg.lstsq(changes, coordinates[:, -1], rcond=RANK)[0]
-                moved = np.diff(np.column_stack(gs), axis=1) + theta * np.diff(np.column_stack(rs), axis=1)
-                following -= moved @ shares
-            return following
 
-        return step
+@dataclass
+class AndersonStep:
+    """The last g with their residuals."""
+
+    theta: float
+    metric: Metric
+    gs: deque[Floats] = field(default_factory=lambda: deque(maxlen=DEPTH + 1))
+    rs: deque[Floats] = field(default_factory=lambda: deque(maxlen=DEPTH + 1))
+
+    def __call__(self, g: Floats, image: Floats) -> Floats:
+        r = image - g
+        self.gs.append(g)
+        self.rs.append(r)
+        following: Floats = g + self.theta * r
+        if len(self.gs) > 1:
+            coordinates = self.metric.coordinates(np.column_stack(self.rs))
+            changes = np.diff(coordinates, axis=1)
+            shares = np.linalg.lstsq(changes, coordinates[:, -1], rcond=RANK)[0]
+            moved = np.diff(np.column_stack(self.gs), axis=1) + self.theta * np.diff(np.column_stack(self.rs), axis=1)
+            following -= moved @ shares
+        return following
 
 
 @dataclass(frozen=True)
@@ -251,21 +272,28 @@ class InverseLeastSquares(OfVectors):
     words = "IQN-ILS"
 
     def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
-        changes: deque[tuple[Floats, Floats]] = deque(maxlen=REMEMBERED)
-        last: tuple[Floats, Floats] | None = None
+        return InverseStep(theta, metric)
 
-        def step(g: Floats, image: Floats) -> Floats:
-            nonlocal last
-            r = metric.coordinates(image - g)
-            if last is not None and (size := float(np.linalg.norm(r - last[0]))) > 0:
-                changes.append(((r - last[0]) / size, (image - last[1]) / size))  # each as long as any other
-            last = r, image
-            if not changes:
-                return g + theta * (image - g)
-            V, W = (np.column_stack(columns) for columns in zip(*changes, strict=True))
-            return np.asarray(image - W @ np.linalg.lstsq(V, r, rcond=RANK)[0])
 
-        return step
+@dataclass
+class InverseStep:
+    """The last changes of r and of T g, in pairs, and the last r and T g."""
+
+    theta: float
+    metric: Metric
+    changes: deque[tuple[Floats, Floats]] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
+    last: tuple[Floats, Floats] | None = None
+
+    def __call__(self, g: Floats, image: Floats) -> Floats:
+        r = self.metric.coordinates(image - g)
+        if self.last is not None and (size := float(np.linalg.norm(r - self.last[0]))) > 0:
+            # each as long as any other
+            self.changes.append(((r - self.last[0]) / size, (image - self.last[1]) / size))
+        self.last = r, image
+        if not self.changes:
+            return g + self.theta * (image - g)
+        V, W = (np.column_stack(columns) for columns in zip(*self.changes, strict=True))
+        return np.asarray(image - W @ np.linalg.lstsq(V, r, rcond=RANK)[0])
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections import deque
 from collections.abc import Callable
@@ -42,6 +43,7 @@ class Coupling:
     """The next force of a coupling whose loop is yours, and what its vectors show.
 
     In a loop over time call :meth:`new_step` at the start of each step, and :meth:`see` for the last evaluation of it.
+    It may be copied and pickled, for restarts and for steps in time that are tried again.
 
     Parameters
     ----------
@@ -73,6 +75,10 @@ class Coupling:
         self._seen: deque[tuple[Floats, Floats, bool]] = deque(maxlen=REMEMBERED)
         self._anew = True
         self._advice: Advice | None = None
+
+    def __copy__(self) -> Coupling:
+        """A copy is independent, as by :func:`copy.deepcopy`."""
+        return copy.deepcopy(self)
 
     def next(self, g: Any, Tg: Any) -> Floats:
         """The force with which T is evaluated next.
@@ -181,7 +187,8 @@ class Coupled(Value):
     Attributes
     ----------
     outcome : Outcome
-        ``converged``; ``diverged`` if ``|Tg - g|`` ran away, or has grown in each of the last PACE steps; ``limit``.
+        ``converged``; ``diverged`` if ``|Tg - g|`` ran away, or has grown in each of the last PACE steps; ``limit``;
+        ``interrupted`` by the listener.
     iterations : int
         Evaluations of T.
     force : array, shape (n,)
@@ -231,6 +238,7 @@ def couple(
     rule: Rule | str = "iqn-ils",
     theta: float | Fraction | str | None = None,
     tolerance: float = 1e-6,
+    absolute: float = 0.0,
     max_iterations: int = 100,
     listen: Callable[[CouplingState], Any] | None = None,
 ) -> Coupled:
@@ -249,10 +257,13 @@ def couple(
         As for :class:`Coupling`.
     tolerance : float
         The coupling ends where ``|Tg - g| <= tolerance |Tg|``, in the Euclidean norm.
+    absolute : float
+        It ends as well where ``|Tg - g| <= absolute``, in the unit of g: where the solution is 0 nothing else does.
     max_iterations : int
         The most evaluations of T; fewer where the residual runs away.
     listen : callable, optional
-        Called with a :class:`CouplingState` after each evaluation: ``print`` shows one line each.
+        Called with a :class:`CouplingState` after each evaluation: ``print`` shows one line each.  Where it returns
+        True the coupling ends here, with the outcome ``interrupted``.
 
     Returns
     -------
@@ -277,7 +288,9 @@ def couple(
     tolerance = float(take("tolerance", tolerance, "a number > 0", lambda value: value > 0))
     whole = lambda value: value >= 1 and value.denominator == 1
     max_iterations = int(take("max_iterations", max_iterations, "a whole number > 0", whole))
-    ending, seen, displacement = Ending(tolerance, max_iterations - 1, patience=math.inf), list[Evaluation](), g
+    absolute = float(take("absolute", absolute, "a number >= 0", lambda value: value >= 0))
+    ending = Ending(tolerance, max_iterations - 1, patience=math.inf, absolute=absolute)
+    seen, displacement = list[Evaluation](), g
 
     def T(g: Floats) -> Floats:
         nonlocal displacement
@@ -290,7 +303,9 @@ def couple(
         if listen is not None:
             left = 0 if outcome is Outcome.CONVERGED else _steps_left(seen, tolerance)
             advice = coupling.advice
-            listen(CouplingState(iterations=len(seen), residual=found.relative, steps_left=left, advice=advice))
+            state = CouplingState(iterations=len(seen), residual=found.relative, steps_left=left, advice=advice)
+            if listen(state) is True and outcome is not Outcome.CONVERGED:
+                return Outcome.INTERRUPTED
         return Outcome.DIVERGED if outcome is Outcome.LIMIT and _grows(seen) else outcome
 
     outcome = follow(evaluations(T, coupling._following, g), ended, seen)

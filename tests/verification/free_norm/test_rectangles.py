@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction as F
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,13 +12,14 @@ from strategies import AT_NIGHT
 import verification as vf
 from ndtheory.continuum.circle import disk
 from ndtheory.continuum.rectangle_circle import RectangleCircle
-from ndtheory.continuum.rectangles import friction_threshold
+from ndtheory.continuum.rectangles import friction_threshold, statement
 from verification.certificate import continuum
 from verification.certificate.continuum import two_rectangles
 from verification.free_norm.numbers import with_friction
 from verification.free_norm.rectangles import RectangleSearch, rectangle_norm
 
 MODEL = two_rectangles(vf.example("section6").changed(radius="0.1"))
+PAGE = Path(__file__).parents[3] / "docs" / "rectangles.md"
 EXCHANGED = replace(MODEL, contact=MODEL.neumann, neumann=MODEL.contact)
 
 
@@ -143,3 +145,23 @@ def test_a_number_that_no_interval_confirms_is_not_shown(exchanged, monkeypatch)
     found = rectangle_norm(EXCHANGED, exchanged, F("0.2"), None)
     assert all(value is None for name, value in vars(found).items() if name != "reason")
     assert set(found.reason) == {"friction_threshold", "theta_max", "factor", "theta_best", "factor_best"}
+
+
+def test_the_page_has_what_is_proved_rounded_to_the_safe_side(proved, own, exchanged):
+    lines = [line for line in PAGE.read_text("utf-8").splitlines() if line.startswith("| ")]
+    names, free, energy = zip(*([cell.strip() for cell in line.split("|")[1:-1]] for line in lines[1:]), strict=True)
+    other = rectangle_norm(EXCHANGED, exchanged, F("0.2"), None)
+    least = [proved.friction_threshold, other.friction_threshold]
+    for shown, number in zip(map(float, free[:2]), least, strict=True):
+        assert number.lo - 2e-4 < shown <= number.lo
+    assert free[2] == r"every $\theta \le 1$"
+    assert proved.theta_max.lo == 1
+    most = [rectangle_norm(MODEL, own, F("0.2"), F("0.6")).factor, proved.factor, proved.factor_best]
+    for shown, number in zip(map(float, free[3:]), most, strict=True):
+        assert number.hi <= shown < number.hi + 2e-4
+    assert f"{proved.theta_best}" in names[-1]
+    says = statement(own, friction="0.2", theta="0.6")
+    known = [friction_threshold(own).lo, friction_threshold(exchanged).lo, says.theta_max_proved.lo]
+    for shown, number in zip((energy[0], energy[1], energy[2].split()[-1].strip("$")), known, strict=True):
+        assert number - 2e-4 < float(shown) <= number
+    assert says.factor.hi <= float(energy[3]) < says.factor.hi + 2e-4
