@@ -19,8 +19,8 @@ S = TypeVar("S")
 #: A run without a new least residual over so many steps has stalled.
 PATIENCE = 50
 
-#: A residual has diverged that is so many times the first one, and has grown in so many steps one after the other.
-RUNAWAY, GROWING = 1e8, 3
+#: A residual grown by this factor over the first one has diverged.
+RUNAWAY = 1e8
 
 
 class Outcome(StrEnum):
@@ -76,7 +76,9 @@ class Ending:
     patience : float
         Steps without a new least residual after which it has stalled.
     runaway : float
-        The factor over the first residual beyond which it has diverged, if it grows.
+        The factor over the first residual beyond which it has diverged.
+    growing : int
+        Steps one after the other in which a residual beyond that has grown, too, if it has diverged.
     absolute : float
         A residual up to this has converged as well, whatever its scale.
     """
@@ -88,12 +90,13 @@ class Ending:
         *,
         patience: float = PATIENCE,
         runaway: float = RUNAWAY,
+        growing: int = 0,
         absolute: float = 0.0,
     ) -> None:
         self._tolerance, self._most, self._absolute = tolerance, most, absolute
-        self._patience, self._runaway = patience, runaway
+        self._patience, self._runaway, self._least_growth = patience, runaway, growing
         self._least = self._first = self._last = math.inf
-        self._growing = 0
+        self._grown = 0
         #: Steps that were taken, and those of them since the least residual.
         self.steps, self.since = -1, 0
 
@@ -107,7 +110,7 @@ class Ending:
         if self.steps == 0:
             self._first = residual
         self._least, self.since = (residual, 0) if residual < self._least else (self._least, self.since + 1)
-        self._growing = self._growing + 1 if residual > self._last else 0
+        self._grown = self._grown + 1 if residual > self._last else 0
         self._last = residual
         if (residual <= self._tolerance * scale < math.inf or residual <= self._absolute) and arrived():
             return Outcome.CONVERGED
@@ -115,7 +118,9 @@ class Ending:
 
     def given_up(self, residual: float) -> Outcome | None:
         """Return the outcome if the iteration ends here without convergence, else None."""
-        if not math.isfinite(residual) or (residual > self._runaway * self._first and self._growing >= GROWING):
+        if not math.isfinite(residual) or (
+            residual > self._runaway * self._first and self._grown >= self._least_growth
+        ):
             return Outcome.DIVERGED
         if self.since >= self._patience:
             return Outcome.STALLED

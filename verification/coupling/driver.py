@@ -32,6 +32,9 @@ REMEMBERED = 20
 #: Number of steps over which the pace of the residual is measured.
 PACE = 4
 
+#: The steps in which a residual that has run away has grown, too: the first one may lie next to a solution of before.
+GROWING = 3
+
 Solver = Callable[[Floats], Any]
 
 
@@ -289,7 +292,7 @@ def couple(
     whole = lambda value: value >= 1 and value.denominator == 1
     max_iterations = int(take("max_iterations", max_iterations, "a whole number > 0", whole))
     absolute = float(take("absolute", absolute, "a number >= 0", lambda value: value >= 0))
-    ending = Ending(tolerance, max_iterations - 1, patience=math.inf, absolute=absolute)
+    ending = Ending(tolerance, max_iterations - 1, patience=math.inf, growing=GROWING, absolute=absolute)
     seen, displacement = list[Evaluation](), g
 
     def T(g: Floats) -> Floats:
