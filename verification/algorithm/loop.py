@@ -84,15 +84,9 @@ class Ending:
     """
 
     def __init__(
-        self,
-        tolerance: float,
-        most: int,
-        *,
-        patience: float = PATIENCE,
-        runaway: float = RUNAWAY,
-        growing: int = 0,
+        self, tolerance: float, most: int, *, patience: float = PATIENCE, runaway: float = RUNAWAY, growing: int = 0,
         absolute: float = 0.0,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._tolerance, self._most, self._absolute = tolerance, most, absolute
         self._patience, self._runaway, self._least_growth = patience, runaway, growing
         self._least = self._first = self._last = math.inf

@@ -80,7 +80,7 @@ class Coupling:
         self._advice: Advice | None = None
 
     def __copy__(self) -> Coupling:
-        """A copy is independent, as by :func:`copy.deepcopy`."""
+        """Independent, as by :func:`copy.deepcopy`."""
         return copy.deepcopy(self)
 
     def next(self, g: Any, Tg: Any) -> Floats:

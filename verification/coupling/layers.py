@@ -22,11 +22,9 @@ class RoleOfLayers(Part):
     neumann_body: BodyNumber = key("who has the Neumann problem in these roles", type="integer")
     theta: float = key(r"the `theta_predicted` of these roles", unit="1")
     factor: Number | None = key(
-        "by which a step contracts there in a norm that the proof chooses",
-        unit="1",
+        "by which a step contracts there in a norm that the proof chooses", unit="1", default=None,
         null="where no norm is found in which it contracts",
-        default=None,
-    )
+    )  # fmt: skip
     friction_threshold: Number = key("friction below which every small theta contracts in such a norm", unit="1")
     reason: dict[str, str] = field(default_factory=dict)
 

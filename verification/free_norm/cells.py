@@ -22,21 +22,20 @@ from fem1d2d.layers import FacingLayers
 from fem1d2d.mesh import Floats
 from ndtheory.continuum.circle import disk
 from verification.free_norm.circle import (
-    BETWEEN,
     INSIDE,
     LOOKED_AT,
     LOOKS,
-    NOTHING,
     START,
     STOP,
     Complex,
     Ends,
+    everywhere,
     point,
     real_rows,
 )
 from verification.interface.friction import hat
 from verification.machine.threads import one_thread
-from verification.semidefinite.interior_point import LMIError, Program, solve
+from verification.semidefinite.interior_point import Program
 
 #: Phases that represent all of them; the least one is this, over the larger of the numbers of rows.
 PHASES, LONG = 48, 0.05
@@ -103,31 +102,29 @@ class CellCircles:
         half, N = point(ends, LOOKED_AT), self.N
         h = np.concatenate([half, half.conj()])[:, None, None, None]
         left, right = (h * of_g + of_p for of_g, of_p in (self._left, self._right))
-        at, nodes = list(self._at), np.arange(N)
-        start = START * np.repeat([1.0, INSIDE, 1.0, 1.0], N)
-        while len(at) < MOST:
+        nodes, start = np.arange(N), START * np.repeat([1.0, INSIDE, 1.0, 1.0], N)
+
+        def program(at: list[tuple[int, int]]) -> Program:
             a, b = (np.hstack([real_rows(rows[place]) for place in at]) for rows in (left, right))
             size, wide = a.shape[1], 4 * N
             least = min(float(np.linalg.eigvalsh(_form(left[place], right[place], start))[0]) for place in at)
-            program = Program(
+            return Program(
                 fixed=np.zeros((size, size)), free=np.eye(size), left=a, right=b, s=1 + abs(least) - least, y=start,
                 cones=np.stack([N + nodes, 2 * N + nodes, 3 * N + nodes], axis=1), stop=STOP,
                 most=np.repeat([1.0, np.inf], [N, 3 * N]), tie=np.vstack([np.eye(4 * N)] * 2),
                 blocks=tuple(slice(k, k + wide) for k in range(0, size, wide)),
             )  # fmt: skip
-            try:
-                found = solve(program)
-            except LMIError:
-                return None
-            if not found.s < -NOTHING:
-                return None
-            values = np.linalg.eigvalsh(_form(left, right, found.y))[..., 0]
-            if values.min() >= -BETWEEN * found.s:
-                self._at = at  # circles nearby need the same
-                return found.y
+
+        def least(y: Floats) -> tuple[float, tuple[int, int]]:
+            values = np.linalg.eigvalsh(_form(left, right, y))[..., 0]
             place, phase = np.unravel_index(int(values.argmin()), values.shape)
-            at.append((int(place), int(phase)))
-        return None
+            return float(values.min()), (int(place), int(phase))
+
+        found = everywhere(program, least, self._at, MOST)
+        if found is None:
+            return None
+        y, _, self._at = found  # circles nearby need the same points
+        return y
 
     @one_thread()
     def factor(self, theta: float) -> float | None:

@@ -15,7 +15,7 @@ In traces d_1 of the contact body p and v are bounded, so that M(h) has the size
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -74,6 +74,27 @@ class Circle:
     y: Floats
 
 
+def everywhere(
+    program: Callable[[list[Any]], Program], least: Callable[[Floats], tuple[float, Any]], at: list[Any], most: int
+) -> tuple[Floats, float, list[Any]] | None:
+    """Multipliers with which M > 0 at all points, its least eigenvalue there, and the few points of their program.
+
+    The worst of all points is added to a program until it is so; None where there are no multipliers.
+    """
+    while len(at) < most:
+        try:
+            found = solve(program(at))
+        except LMIError:
+            return None
+        if not found.s < -NOTHING:
+            return None
+        margin, where = least(found.y)
+        if margin >= -BETWEEN * found.s:
+            return found.y, margin, at
+        at = [*at, where]
+    return None
+
+
 class Circles:
     """The programs for multipliers on circles, for one pair of bodies and one friction.
 
@@ -103,20 +124,12 @@ class Circles:
 
     def find(self, ends: Ends) -> Circle | None:
         """Multipliers for which M is positive definite on the circle with some ends; None where there are none."""
-        at = self._points
-        while len(at) < MOST:
-            try:
-                found = solve(self._on(ends, at))
-            except LMIError:
-                return None
-            if not found.s < -NOTHING:
-                return None
-            margin, where = self._least(ends, found.y)
-            if margin >= -BETWEEN * found.s:
-                return Circle(margin=margin, largest=max(map(abs, ends)), y=found.y)
-            at = [*at, where]
-            self._points = at[:KEPT]  # circles nearby need the same
-        return None
+        found = everywhere(lambda at: self._on(ends, at), lambda y: self._least(ends, y), self._points, MOST)
+        if found is None:
+            return None
+        y, margin, at = found
+        self._points = at[:KEPT]  # circles nearby need the same
+        return Circle(margin=margin, largest=max(map(abs, ends)), y=y)
 
     def norm(self, theta: float, q: float, circle: Circle) -> tuple[Floats, Weights] | None:
         """Q in coordinates in which (5.21) is Euclidean, and multipliers node by node, from a circle of theta and q.

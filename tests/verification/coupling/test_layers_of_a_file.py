@@ -7,36 +7,43 @@ import pytest
 from problem_list import blocks
 
 import verification as vf
+from ndtheory.continuum.circle import TwoLayers
+from ndtheory.continuum.strip import Strip
+from ndtheory.moduli import Moduli
 from verification.coupling.sections import sections
+from verification.free_norm.search import Search
 from verification.free_norm.two_layers import two_layers
 from verification.show.layout import text
 
 SECTION_6 = vf.example("section6").changed(cells=((10, 2), (6, 2)))
 
 
+def layer(young, depth):
+    return Strip(body=Moduli(young=young, poisson="0.3"), thickness=F(depth))
+
+
 def test_the_numbers_are_those_of_the_calculator_of_layers():
     found = vf.advise(SECTION_6)
-    for given in found.layers:
-        order = slice(None, None, 1 if given.neumann_body == 1 else -1)
-        said = two_layers(
-            young=(70000, 20000)[order], poisson=("0.3", "0.3"), depth=("0.3", "0.3"), friction="0.2", radius="0.1",
-            theta=F(given.theta),
-        ).roles[0].lyapunov  # fmt: skip
-        assert given.factor.value == pytest.approx(said.factor.value, rel=1e-4)
-        assert given.friction_threshold.value == pytest.approx(said.friction_threshold.value, rel=1e-4)
+    one, other = found.layers
+    said = two_layers(
+        young=(70000, 20000), poisson=("0.3", "0.3"), depth=("0.3", "0.3"), friction="0.2", radius="0.1",
+        theta=F(one.theta),
+    )  # fmt: skip
+    assert one.factor.value == pytest.approx(said.roles[0].lyapunov.factor.value, rel=1e-4)
+    for given, role in zip((one, other), said.roles, strict=True):
+        assert given.neumann_body == role.neumann
+        assert given.friction_threshold.value == pytest.approx(role.lyapunov.friction_threshold.value, rel=1e-4)
     assert [given.theta for given in found.layers] == [role.theta_predicted for role in found.roles]
     assert {given.factor.level for given in found.layers} == {"float"}
 
 
 def test_depths_radius_and_friction_are_those_of_the_file():
     changed = SECTION_6.with_keys({"body1.y": "[-0.9, 0]", "contact.radius": "0.2", "contact.friction": "0.7"})
-    one, other = vf.advise(changed).layers
-    said = two_layers(
-        young=(70000, 20000), poisson=("0.3", "0.3"), depth=("0.9", "0.3"), friction="0.7", radius="0.2",
-        theta=F(one.theta),
-    )  # fmt: skip
-    assert one.factor.value == pytest.approx(said.roles[0].lyapunov.factor.value, rel=1e-4)
-    assert other.friction_threshold.value == pytest.approx(said.roles[1].lyapunov.friction_threshold.value, rel=1e-4)
+    lower, upper = layer(70000, "0.9"), layer(20000, "0.3")
+    for given, contact, neumann in zip(vf.advise(changed).layers, (upper, lower), (lower, upper), strict=True):
+        search = Search(TwoLayers(contact=contact, neumann=neumann, radius=F(1, 5)))
+        assert given.factor.value == pytest.approx(search.factor(given.theta, 0.7), rel=1e-6)
+        assert given.friction_threshold.value == pytest.approx(search.friction_threshold, rel=1e-6)
 
 
 def test_the_roles_of_the_file_do_not_matter_and_the_mesh_only_by_its_theta():
