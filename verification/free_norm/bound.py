@@ -8,13 +8,12 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Number
-from ndtheory.constants import relaxation_factor
 from ndtheory.keys import Part, key
 from ndtheory.number import Numeric, above
 from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, rest_of, trace
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
-from verification.semidefinite.bound import pair_of
+from verification.semidefinite.bound import asked, pair_of
 
 if TYPE_CHECKING:
     from verification.algorithm.rates import ForceNorm
@@ -76,20 +75,14 @@ class FreeNormBound(Bound):
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         from verification.semidefinite.interior_point import LMIError
 
-        needed = "needed a pair of bodies and a theta"
-        if theta is None:
-            return self.absent(needed)
         try:
-            _, measured = pair_of(subject, needed)
+            pair, measured, chosen = asked(subject, theta)
         except NotComputed as error:
             return self.absent(str(error))
-
-        chosen = relaxation_factor(theta)
         try:
-            found = _work_out(subject, Fraction(chosen), progress)
+            detail, norm = _work_out(pair, measured, chosen, progress)
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
-        detail, norm = found
         on = "k" if detail.friction_threshold is not None or measured.C_t1 is None else "any"
         largest = detail.theta_max
         return BoundResult(
@@ -148,7 +141,7 @@ class FreeNormBound(Bound):
             return None if found is None else (0.0, found.theta)
 
         try:
-            allowed = _friction(subject, progress)
+            allowed = _friction(pair, measured, progress)
             if allowed is None:
                 raise NotComputed("no friction is found at which small thetas contract")
             k, theta = trace(interval, allowed[0], TRACED)
@@ -161,20 +154,19 @@ class FreeNormBound(Bound):
         return {} if result.detail is None else {self.name: replace(result.detail, verdict=verdict)}
 
 
-def _work_out(subject: Subject, theta: Fraction, progress: Progress) -> tuple[FreeNormOfPair, ForceNorm | None]:
+def _work_out(
+    pair: ContactPair, measured: Measured, theta: Fraction, progress: Progress
+) -> tuple[FreeNormOfPair, ForceNorm | None]:
     """The numbers for a pair, proved for its rational data where the constants were, and the norm of its factor."""
     from verification.free_norm.norm import FreeNorm
     from verification.free_norm.radius import largest_radius
 
-    pair, measured = subject.pair, subject.measured
-    assert pair is not None
-    assert measured is not None
     progress("free norm: factor of one step", None)
     free = FreeNorm(pair, measured)
     proof, largest = free.factor(float(theta)), free.largest_theta()
     progress("free norm: best theta", None)
     best = None if largest is None else free.best_theta(largest.theta)
-    allowed = _friction(subject, progress)
+    allowed = _friction(pair, measured, progress)
     number: dict[str, Number | None] = {
         "factor": None if proof is None else Number.of_float(proof.factor),
         "factor_best": None if best is None else Number.of_float(best.factor),
@@ -240,13 +232,12 @@ def _verified(
     return found, why
 
 
-def _friction(subject: Subject, progress: Progress) -> tuple[float, Proved] | None:
+def _friction(pair: ContactPair, measured: Measured, progress: Progress) -> tuple[float, Proved] | None:
     """The friction up to which every small theta contracts; None where none is found, or friction has no law."""
     from verification.free_norm.norm import friction_threshold
     from verification.semidefinite.interior_point import LMIError
 
-    pair, measured = subject.pair, subject.measured
-    if pair is None or measured is None or measured.friction_threshold is None:
+    if measured.friction_threshold is None:
         return None
     try:
         return friction_threshold(pair, measured, measured.friction_threshold.value, progress=progress)

@@ -12,6 +12,8 @@ from verification.registry import BOUNDS
 from verification.semidefinite import LARGEST
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
     from verification.semidefinite.lipschitz import Enclosure
@@ -37,6 +39,14 @@ def pair_of(subject: Subject, needed: str, *, law: bool = False) -> tuple[Contac
     return pair, measured
 
 
+def asked(subject: Subject, theta: Numeric | None) -> tuple[ContactPair, Measured, Fraction]:
+    """The pair of a subject, its constants, and the theta of a factor; NotComputed as by :func:`pair_of`."""
+    needed = "needed a pair of bodies and a theta"
+    if theta is None:
+        raise NotComputed(needed)
+    return *pair_of(subject, needed), relaxation_factor(theta)
+
+
 class SemidefiniteBound(Bound):
     """The factor proved by multipliers of the conditions of step II, up to LARGEST nodes; see ``docs/energy.md``."""
 
@@ -50,14 +60,10 @@ class SemidefiniteBound(Bound):
         from verification.semidefinite.interior_point import LMIError
         from verification.semidefinite.lipschitz import work_out
 
-        needed = "needed a pair of bodies and a theta"
-        if theta is None:
-            return self.absent(needed)
         try:
-            pair, measured = pair_of(subject, needed)
+            pair, measured, chosen = asked(subject, theta)
         except NotComputed as error:
             return self.absent(str(error))
-        chosen = relaxation_factor(theta)
         theta = float(chosen)
         try:
             found = work_out(pair, measured, theta, exact=subject.exact, progress=progress)
