@@ -40,8 +40,8 @@ GRID = tuple(n / 40 for n in range(1, 40))
 #: How many pieces of T_theta are multiplied to find what no norm goes below; the search begins with powers of one.
 LENGTHS = (2, 3)
 
-#: Digits of a factor that are kept: the search for a norm ends within 0.4 %.
-DIGITS = 4
+#: Digits of a factor that are kept, for tests that compare; the search for a norm ends within 0.4 %.
+DIGITS = 6
 
 
 @dataclass(frozen=True, kw_only=True)
