@@ -104,8 +104,13 @@ class FreeNorm:
         high = high if low < high else 1.0
         at = lambda q: self._circles.find(disk(theta, q))
         border = _border(at, high, low, lambda q: near * max(min(q, 1 - q), COARSE * theta)) or (high, at(high))
-        found = next(filter(None, (self._inside(theta, border, share, at) for share in INSIDE)), None)
-        if energy is not None and energy.value < 1 and (found is None or energy.value <= (1 + near) * found.factor):
+        found: Proved | None = None
+        known = (1 + near) * border[0]
+        for proof in filter(None, (self._inside(theta, border, share, at) for share in INSIDE)):
+            found = proof if found is None or proof.factor < found.factor else found
+            if found.factor <= known:  # a norm may prove less than its circle promised
+                break
+        if energy is not None and energy.value < 1 and (found is None or energy.value <= max(known, found.factor)):
             size = 1 + ABOVE  # nothing is gained, as without friction
             return self._proof(theta, size * np.eye(self.forms.size), times(size, energy.multipliers)) or found
         return found
