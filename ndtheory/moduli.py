@@ -305,6 +305,30 @@ def conduction(
     return min(long, short) * thick, max(long, short) / thick if thick else math.inf
 
 
+def cooled(
+    film: Fraction,
+    conductivity: Fraction,
+    *,
+    thickness: Fraction | None = None,
+    capacity: Fraction | None = None,
+    dt: Fraction | None = None,
+) -> float:
+    """The largest ratio of a film coefficient to the conductance of a flat plate, over all waves; the least is 0.
+
+    In the steady state the plate, of a thickness, is held at a temperature on its other side; in a step in time, with
+    a capacity per volume, anything may hold it, and without a thickness it is thick.
+
+    Examples
+    --------
+    >>> cooled(10, 50, thickness=Fraction("0.02")), cooled(10, 4, capacity=1, dt=1)
+    (0.004, 5.0)
+    """
+    if capacity is None or dt is None:
+        return float(film * (thickness or math.inf) / conductivity)
+    reach = math.sqrt(conductivity * dt / capacity)
+    return float(film) * reach / float(conductivity) / (math.tanh(thickness / reach) if thickness else 1.0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Wall:
     """A wall beside a fluid: a plate held along two lines, ``length`` apart, or a tube; without E only masses count."""

@@ -75,7 +75,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "couplings": {
         "verification.coupling": (
             "__init__ accelerated advice cells driver ends evidence from_logs from_matrices from_moduli from_problems "
-            "from_runs from_vectors kinds kratos layers log_files log_formats log_lines material_sections "
+            "from_runs from_vectors general kinds kratos layers log_files log_formats log_lines material_sections "
             "matrix_files methods pace readings roles runs runs_sections runs_with_friction sections seen seen_moduli "
             "sides snippets spectrum vectors waves"
         )

@@ -39,7 +39,8 @@ _REFERENCE = re.compile(r"\{(\w+)\}`(?:([^`<]+) <[^`>]+>|([^`]+))`")
 @cache
 def tables() -> dict[str, tuple[Row, ...]]:
     """Return the rows of each table, by the schema of a document or the name of a part."""
-    registry.load("documents", "")
+    for table in ("documents", "bounds"):  # whose parts are the keys
+        registry.load(table, "")
     classes = {each.key_table(): each for each in subclasses(Document) if keys.keys(each) and vars(each).get("schema")}
     parts = {part: each for each in subclasses(keys.Part) if (part := vars(each).get("part"))}
     made = {

@@ -79,15 +79,12 @@ class Ending:
         The factor over the first residual beyond which it has diverged.
     growing : int
         Steps one after the other in which a residual beyond that has grown, too, if it has diverged.
-    absolute : float
-        A residual up to this has converged as well, whatever its scale.
     """
 
     def __init__(
-        self, tolerance: float, most: int, *, patience: float = PATIENCE, runaway: float = RUNAWAY, growing: int = 0,
-        absolute: float = 0.0,
-    ) -> None:  # fmt: skip
-        self._tolerance, self._most, self._absolute = tolerance, most, absolute
+        self, tolerance: float, most: int, *, patience: float = PATIENCE, runaway: float = RUNAWAY, growing: int = 0
+    ) -> None:
+        self._tolerance, self._most = tolerance, most
         self._patience, self._runaway, self._least_growth = patience, runaway, growing
         self._least = self._first = self._last = math.inf
         self._grown = 0
@@ -106,7 +103,7 @@ class Ending:
         self._least, self.since = (residual, 0) if residual < self._least else (self._least, self.since + 1)
         self._grown = self._grown + 1 if residual > self._last else 0
         self._last = residual
-        if (residual <= self._tolerance * scale < math.inf or residual <= self._absolute) and arrived():
+        if residual <= self._tolerance * scale < math.inf and arrived():
             return Outcome.CONVERGED
         return self.given_up(residual)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import ClassVar, final
@@ -30,6 +30,9 @@ DEPTH = 10
 
 #: Number of earlier steps that IQN-ILS uses.
 REMEMBERED = 40
+
+#: A change of an earlier step in time counts if this share of it is no combination of newer ones.
+FILTER = 1e-2
 
 #: Columns of the least-squares problem of Anderson mixing are dropped below this share of the largest.
 RANK = 1e-8
@@ -269,12 +272,17 @@ class InverseLeastSquares(OfVectors):
 
 @dataclass
 class InverseStep:
-    """The last changes of r and of T g, in pairs, and the last r and T g."""
+    """The last changes of r and of T g, in pairs, those of ``earlier`` steps in time, and the last r and T g."""
 
     theta: float
     metric: Metric
     changes: deque[tuple[Floats, Floats]] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
     last: tuple[Floats, Floats] | None = None
+    earlier: tuple[deque[tuple[Floats, Floats]], ...] = ()
+
+    def next_step(self, reuse: int) -> InverseStep:
+        """The rule in the next step in time, with the changes of the last steps, the newest ones first."""
+        return InverseStep(self.theta, self.metric, earlier=(self.changes, *self.earlier)[:reuse])
 
     def __call__(self, g: Floats, image: Floats) -> Floats:
         r = self.metric.coordinates(image - g)
@@ -282,10 +290,26 @@ class InverseStep:
             # each as long as any other
             self.changes.append(((r - self.last[0]) / size, (image - self.last[1]) / size))
         self.last = r, image
-        if not self.changes:
+        known = [*reversed(self.changes), *filtered(self.changes, self.earlier)]
+        if not known:
             return g + self.theta * (image - g)
-        V, W = (np.column_stack(columns) for columns in zip(*self.changes, strict=True))
+        V, W = (np.column_stack(columns) for columns in zip(*known, strict=True))
         return np.asarray(image - W @ np.linalg.lstsq(V, r, rcond=RANK)[0])
+
+
+def filtered(
+    changes: Iterable[tuple[Floats, Floats]], earlier: Sequence[Iterable[tuple[Floats, Floats]]]
+) -> list[tuple[Floats, Floats]]:
+    """The changes of earlier steps, the newest first, that show a direction of r which no newer one has shown."""
+    kept, basis = list[tuple[Floats, Floats]](), list[Floats]()
+    for own, pairs in ((True, changes), *((False, of) for of in earlier)):
+        for v, w in reversed([*pairs]):
+            rest = v - sum((q * (q @ v) for q in basis), np.zeros_like(v))
+            size = float(np.linalg.norm(rest))
+            if size > FILTER or own:
+                basis += [rest / size] if size > 0 else []
+                kept += [] if own else [(v, w)]
+    return kept
 
 
 @dataclass(frozen=True)

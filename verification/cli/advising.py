@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import AdviseCommand, AdviseGroup, Default, cli
 from verification.cli.options import JSON, SET, SWAP, F, OneOf, Typed
 from verification.cli.problems import load_problem
+from verification.coupling.kinds import Kind, kind_of
 from verification.coupling.snippets import SNIPPETS
 from verification.show.layout import nothing_typed
 
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from verification.machine.progress import Progress
 
 
-def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -> Advice:
+def advice_from_files(given: Mapping[str, Any], tell: Progress, *, kind: Kind) -> Advice:
     """The advice from the options of ``advise matrices`` that were given, S1 among them, by parameter."""
     from verification.coupling.from_matrices import advise_matrices
     from verification.coupling.from_problems import advise
@@ -39,7 +41,7 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
     if set(NEEDED) <= held:
         if others:
             raise click.UsageError(f"received {others[0]} with {S1}: an interface file has all of it", context)
-        return advise(S1, tied=tied, progress=tell)
+        return advise(S1, tied=kind.linear, progress=tell)
     if S2 is None and not {"S1", "S2"} <= held:
         raise click.UsageError(f"{S1}: needed both --S1 and --S2, or one file with arrays S1 and S2", context)
     if held & {"S1", "S2"} == {"S1"}:
@@ -57,7 +59,7 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
         values["neumann_body"] = int(given["neumann_body"])
     files = ", ".join(dict.fromkeys(str(value) for value in given.values() if isinstance(value, Path)))
     try:
-        return advise_matrices(**values, tied=tied, progress=tell)
+        return advise_matrices(**values, kind=kind, progress=tell)
     except (ValueError, MemoryError) as error:
         of_option = isinstance(error, HypothesisError) and error.key == "friction"
         raise click.UsageError(f"--{error}" if of_option else f"{files}: {error}", context) from None
@@ -75,6 +77,28 @@ def _grids(transfer: Path, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 TIED = click.option("--tied", is_flag=True, help="Nothing opens or slips: tied bodies, heat, a fluid at a wall.")
+
+
+def of_kind(command: Callable[..., None]) -> Callable[..., None]:
+    """The options that say of which kind a coupling is, as one parameter ``kind``."""
+
+    @click.option(
+        "--kind",
+        type=OneOf(["contact", "tied", "general"]),
+        help="Kind of coupling: general may have positive feedback; by default contact.",
+    )
+    @TIED
+    @click.option("--parallel", is_flag=True, help="Parallel coupling: both solvers run at once.")
+    @wraps(command)
+    def typed(kind: str | None, tied: bool, parallel: bool, **given: Any) -> None:
+        if tied and kind not in (None, "tied"):
+            needed = f"received --tied with --kind {kind}: needed one of them"
+            raise click.UsageError(needed, click.get_current_context())
+        command(kind=kind_of(kind, tied=tied, parallel=parallel), **given)
+
+    return typed
+
+
 SNIPPETS_OF = click.option(
     "--snippets",
     type=OneOf([*SNIPPETS, "all"], case_sensitive=False),
@@ -159,7 +183,7 @@ def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callabl
 @click.option(
     "--neumann-body", type=OneOf(["1", "2"]), help="From whose unknowns --map leads, where its shape fits both ways."
 )
-@TIED
+@of_kind
 @click.option(
     "--friction",
     metavar="K",
@@ -177,7 +201,7 @@ def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callabl
 @_matrix("--weights", "weights", "Weights of the quadrature on these nodes; by default those of the trapezoid rule.")
 @SNIPPETS_OF
 @JSON
-def matrices(tied: bool, snippets: str | None, as_json: bool, **given: Any) -> None:
+def matrices(kind: Kind, snippets: str | None, as_json: bool, **given: Any) -> None:
     """Advice from the interface stiffnesses of any code.
 
     S1 and S2 are the Schur complements of both bodies on the same interface unknowns, or on two grids with a --map.
@@ -198,7 +222,7 @@ def matrices(tied: bool, snippets: str | None, as_json: bool, **given: Any) -> N
     """
     _no_document_of(snippets, as_json)
     with stages() as tell:
-        found = advice_from_files({name: value for name, value in given.items() if value is not None}, tell, tied=tied)
+        found = advice_from_files({name: value for name, value in given.items() if value is not None}, tell, kind=kind)
     _show(found, snippets, as_json)
 
 
@@ -221,9 +245,11 @@ def matrices(tied: bool, snippets: str | None, as_json: bool, **given: Any) -> N
 )
 @click.option(
     "--ratio",
+    "ratios",
     metavar="NUMBER",
+    multiple=True,
     help="Ratio of its residual |Tg - g|, absolute and unrelaxed, from one step to the next, steady over 10 or more; "
-    "1 where it rises and falls.",
+    "1 where it rises and falls.  Of several runs, of kind general, one each with its --theta.",
 )
 @click.option(
     "--pattern",
@@ -231,17 +257,21 @@ def matrices(tied: bool, snippets: str | None, as_json: bool, **given: Any) -> N
     help="Lines of another log: one group, the residual, or groups named residual, iteration, theta, and omega of "
     "Aitken.",
 )
+@click.option("--format", "name", metavar="NAME", help="Format of the logs, where one is not recognised by itself.")
+@click.option("--log10", is_flag=True, help="The residuals are decimal logarithms, as of SU2.")
 @click.option("--friction", is_flag=True, help="There is friction: bounds, and the run to make next.")
-@TIED
+@of_kind
 @SNIPPETS_OF
 @JSON
 def run(
     logs: tuple[Path, ...],
     thetas: tuple[str, ...],
-    ratio: str | None,
+    ratios: tuple[str, ...],
     pattern: str | None,
+    name: str | None,
+    log10: bool,
     friction: bool,
-    tied: bool,
+    kind: Kind,
     snippets: str | None,
     as_json: bool,
 ) -> None:
@@ -252,8 +282,8 @@ def run(
     --friction runs are read as runs without friction.  Give the ratio of the absolute residual |Tg - g|, not of the
     relative one of coupling libraries; a log may hold either, in any unit.
 
-    Logs may be of preCICE, Kratos, solids4foam, Norma.jl, Feel++ and MOOSE, columns of numbers, or others with a
-    --pattern.
+    Logs may be of preCICE, Kratos, solids4foam, FOAM-FSI, Norma.jl, Feel++, MOOSE, CoCoNuT, OpenMDAO, Elmer, GEOS and
+    SU2, columns of numbers, or others with a --pattern.
 
     \b
     Examples:
@@ -261,44 +291,64 @@ def run(
       ndtheory advise run --log precice-Solid-convergence.log --theta 0.5
       ndtheory advise run --log a.log --theta 0.3 --log b.log --theta 0.6
       ndtheory advise run --log a.log --theta 0.3 --friction
+      ndtheory advise run --kind general --theta 1 --ratio 0.885
       ndtheory advise run --log out.txt --theta 0.5 --pattern 'res = (\\S+)'
     """
     context = click.get_current_context()
     _no_document_of(snippets, as_json)
-    if bool(logs) == (ratio is not None):
+    if bool(logs) == bool(ratios):
         received = "--log with --ratio: a log shows its own ratio" if logs else "neither --log nor --ratio"
         raise click.UsageError(f"received {received}: needed one of --log and --ratio", context)
-    if pattern is not None and not logs:
-        raise click.UsageError("received --pattern without --log", context)
-    given = _thetas_of(logs, thetas, pattern)
-    if len(given) != max(len(logs), 1):
-        received = f"received {len(thetas)} --theta with {len(logs)} --log"
-        raise click.UsageError(f"{received}: needed one --theta for each log, or one with --ratio", context)
-    if tied and friction:
-        raise click.UsageError("received --tied with --friction: nothing slips on a tied interface", context)
+    of_logs = {"--pattern": pattern, "--format": name, "--log10": log10}
+    if not logs and (alone := [option for option, value in of_logs.items() if value]):
+        raise click.UsageError(f"received {alone[0]} without --log", context)
+    if pattern is not None and name is not None:
+        raise click.UsageError("received --pattern with --format: needed one of them", context)
+    if len(ratios) > 1 and kind.signed:
+        needed = "needed one, or the --log of each; several ratios are of --kind general"
+        raise click.UsageError(f"received {len(ratios)} --ratio: {needed}", context)
+    if friction and kind.linear:
+        raise click.UsageError(f"received {kind.typed}with --friction: nothing slips there", context)
+    if kind.parallel and (friction or not kind.signed):
+        beside = "--friction" if friction else "--kind general"
+        needed = "needed vectors, ndtheory advise vectors, as residuals say nothing then"
+        raise click.UsageError(f"received --parallel with {beside}: {needed}", context)
     from verification.coupling.from_logs import advise_logs
     from verification.coupling.from_runs import advise_run
     from verification.coupling.log_lines import PatternError
 
     try:
-        if ratio is None:
-            found = advise_logs(zip(logs, given, strict=True), tied=tied, friction=friction, pattern=pattern)
+        given = _thetas_of(logs, thetas, {"pattern": pattern, "name": name, "log10": log10})
+        _counted(given, logs, ratios, thetas)
+        if logs:
+            form: dict[str, Any] = {"pattern": pattern, "format": name, "log10": log10}
+            found = advise_logs(zip(logs, given, strict=True), kind=kind, friction=friction, **form)
         else:
-            found = advise_run(thetas[0], ratio, tied=tied, friction=friction)
+            *earlier, last = zip(thetas, ratios, strict=True)
+            found = advise_run(*last, kind=kind, friction=friction, earlier=earlier)
     except PatternError as error:
-        raise click.UsageError(f"--pattern = {pattern}: {error}", context) from None
+        what = f"--format = {name}" if pattern is None else f"--pattern = {pattern}"
+        raise click.UsageError(f"{what}: {error}", context) from None
     except HypothesisError as error:
         raise click.UsageError(f"--{error}", context) from None
     _show(found, snippets, as_json)
 
 
-def _thetas_of(logs: Sequence[Path], thetas: Sequence[str], pattern: str | None) -> Sequence[str | None]:
+def _counted(given: Sequence[str | None], logs: Sequence[Path], ratios: Sequence[str], thetas: Sequence[str]) -> None:
+    """UsageError where a log or a ratio has no theta."""
+    if len(given) != max(len(logs), len(ratios)):
+        received = f"received {len(thetas)} --theta with {len(logs)} --log and {len(ratios)} --ratio"
+        context = click.get_current_context()
+        raise click.UsageError(f"{received}: needed one --theta for each of them", context)
+
+
+def _thetas_of(logs: Sequence[Path], thetas: Sequence[str], form: Mapping[str, Any]) -> Sequence[str | None]:
     """The theta of each log; fewer than logs are for those whose relaxation was constant and that name no factor."""
     if not thetas or len(thetas) >= len(logs):
         return thetas or (None,) * len(logs)
     from verification.coupling.log_files import read_log
 
-    read = [read_log(path, pattern) for path in logs]
+    read = [read_log(path, **form) for path in logs]
     wanted = [log.accelerator is None and log.theta is None for log in read]
     left = iter(thetas)
     return [next(left) if needed else None for needed in wanted] if sum(wanted) == len(thetas) else thetas
@@ -346,6 +396,9 @@ def _shape(context: click.Context, parameter: click.Parameter, value: str | None
 )
 @click.option("--conductivity", metavar="K1,K2", help="Heat flow: conductivities of plates 1 and 2.")
 @click.option(
+    "--film", metavar="H", help="Heat flow: film coefficient of a fluid at a wall; --conductivity of the wall."
+)
+@click.option(
     "--capacity", metavar="C1,C2", help="Heat flow in time: capacities per volume, density times specific heat."
 )
 @click.option("--density", metavar="RHO_F,RHO_S", help="A fluid: densities of the fluid and of the wall.")
@@ -360,16 +413,16 @@ def _shape(context: click.Context, parameter: click.Parameter, value: str | None
     help="A fluid: length of the wall between its ends; of a tube, its length and its radius.",
 )
 @click.option("--dt", metavar="TIME", help="Heat with a capacity, or fluid: the step in time.")
-@click.option("--parallel", is_flag=True, help="Parallel coupling: both solvers run at once.")
+@of_kind
 @JSON
-def moduli(shape: dict[str, Any], parallel: bool, as_json: bool, **given: str | None) -> None:
+def moduli(shape: dict[str, Any], kind: Kind, as_json: bool, **given: str | None) -> None:
     """Bound rho from material data, before there is a mesh.
 
     Elastic bodies: their moduli bound rho (no unit) from below, in both roles.  A theta to start with is proved only
     where the mirror image of one body fits into the other: say so with --shape.
 
-    Heat: conductivities of two flat plates give theta.  Fluid: densities bound rho from below by the added mass of the
-    longest wave.  Units: any, one set for all.
+    Heat: conductivities of two flat plates give theta, or the film coefficient of a fluid with the wall's conductivity.
+    Fluid: densities bound rho from below by the added mass of the longest wave.  Units: any, one set for all.
 
     \b
     Examples, in MPa and in SI units:
@@ -377,18 +430,19 @@ def moduli(shape: dict[str, Any], parallel: bool, as_json: bool, **given: str | 
       ndtheory advise moduli --young 7e4,2e4 --poisson 0.3,0.3 \\
         --shape corners-2,mirror-2,flat
       ndtheory advise moduli --conductivity 50,0.5 --capacity 3.6e6,1.6e6
+      ndtheory advise moduli --film 500 --conductivity 0.3 --thickness 0.01
       ndtheory advise moduli --density 1000,1200 --thickness 1e-3 \\
         --length 0.05,0.005
     """
     context = click.get_current_context()
     data: dict[str, Any] = {name: value.split(",") for name, value in given.items() if value is not None}
-    if not {"young", "conductivity", "density"} & data.keys():
+    if not {"young", "conductivity", "film", "density"} & data.keys():
         received = f"received {f'--{min(data)} alone' if data else 'no material'}"
         raise click.UsageError(f"{received}: needed --young and --poisson, --conductivity, or --density", context)
     from verification.coupling.from_moduli import advise_moduli
 
     try:
-        found = advise_moduli(**data, **shape, parallel=parallel)
+        found = advise_moduli(**data, **shape, kind=kind)
     except HypothesisError as error:
         option = "--shape, " if error.key in ("plane", "corners", "mirror", "flat") else "--"
         raise click.UsageError(f"{option}{error}", context) from None
@@ -398,16 +452,16 @@ def moduli(shape: dict[str, Any], parallel: bool, as_json: bool, **given: str | 
 @click.command(cls=AdviseCommand)
 @click.argument("iterates", metavar="X", type=click.Path(path_type=Path))
 @click.argument("images", metavar="TX", type=click.Path(path_type=Path), required=False)
-@TIED
+@of_kind
 @SNIPPETS_OF
 @JSON
-def vectors(iterates: Path, images: Path | None, tied: bool, snippets: str | None, as_json: bool) -> None:
+def vectors(iterates: Path, images: Path | None, kind: Kind, snippets: str | None, as_json: bool) -> None:
     """Read the spectrum off a few iterates and their images.
 
     X has a row for each iterate of a run, TX the row that T made of it before relaxation, in any one unit; three to ten
     iterates of a run by any method are enough, all of one step in time.  Files are .npy, .npz (one file with X and TX
     too), .mtx, .mat, .csv or .txt.  The answer has the ends of the spectrum (no unit), theta, and the steps of a
-    constant theta, Aitken and IQN-ILS.
+    constant theta, Aitken and IQN-ILS.  With --parallel a row has both fields, one behind the other.
 
     \b
     Examples:
@@ -424,7 +478,7 @@ def vectors(iterates: Path, images: Path | None, tied: bool, snippets: str | Non
         raise click.UsageError(f"{iterates}: needed X and TX, or one file with arrays X and TX", context)
     X, TX = read_matrix(iterates, "X"), read_matrix(images or iterates, "TX")
     try:
-        found = advise_vectors(X, TX, tied=tied)
+        found = advise_vectors(X, TX, kind=kind)
     except ValueError as error:
         files = ", ".join(map(str, dict.fromkeys([iterates, images or iterates])))
         raise click.UsageError(f"{files}: {error}", context) from None

@@ -17,8 +17,9 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from ndtheory.keys import Part, key
 from ndtheory.keys import says as means
+from verification.coupling.kinds import Kind
 from verification.coupling.log_files import Log
-from verification.coupling.readings import LARGEST_TO_PASTE, SHOWS_MOST, NextRun, few, rounded_down
+from verification.coupling.readings import SHOWS_MOST, NextRun, few, rounded_down
 from verification.coupling.spectrum import MARGIN, Spectrum
 
 #: A factor counts as long as the residual is above this share of the largest: the solvers' own accuracy is below it.
@@ -130,23 +131,26 @@ def seen_factors(log: Log) -> SeenFactors | None:
     )
 
 
-def spectrum_of(logs: Iterable[Accelerated]) -> Spectrum | None:
-    """The spectrum between the ends that the factors of all logs show, MARGIN added; None where each has a doubt."""
+def spectrum_of(logs: Iterable[Accelerated], kind: Kind) -> Spectrum | None:
+    """The spectrum between the ends that the factors of all logs show, MARGIN added; None where each has a doubt.
+
+    Of parallel coupling, and of kind general, factors show no ends.
+    """
     known = [log.factors for log in logs if log.factors is not None and not log.factors.doubt]
-    if not known:
+    if not known or kind.parallel or not kind.signed:
         return None
     low, high = min(found.low for found in known), max(found.high for found in known)
     return Spectrum.between(low, high + MARGIN * (1 + high))
 
 
-def after_accelerated(spectrum: Spectrum | None, tied: bool) -> NextRun:
+def after_accelerated(spectrum: Spectrum | None, kind: Kind) -> NextRun:
     """The theta to paste of a tied interface, or the run with constant relaxation that shows more."""
     if spectrum is None:
         why = f"{SHOWS_MOST}. Or save some iterates of the run as it is, and type ndtheory advise vectors"
         return NextRun(theta=1.0, why=why)
-    theta = rounded_down(min(Fraction(spectrum.theta), LARGEST_TO_PASTE))
+    theta = rounded_down(min(Fraction(spectrum.theta), kind.most))
     ends = f"2/(2 + least + largest) with lambda from {few(spectrum.low)} to {few(spectrum.high)} by Aitken's factors"
-    if tied:
+    if kind.linear:
         return NextRun(theta=theta, why=f"{ends}, the largest with {100 * MARGIN:g} % added: an estimate")
     why = f"{ends}, an estimate for one contact pattern; its log, with constant relaxation, shows whether it holds"
     return NextRun(theta=theta, why=why)

@@ -12,10 +12,10 @@ from verification.algorithm.rates import steps
 from verification.coupling import methods, runs
 from verification.coupling.accelerated import Accelerated
 from verification.coupling.evidence import Evidence, Parallel
-from verification.coupling.kinds import BodyNumber
+from verification.coupling.kinds import BodyNumber, Kind
 from verification.coupling.layers import RoleOfLayers
 from verification.coupling.methods import Advised, MethodRow
-from verification.coupling.readings import LARGEST_TO_PASTE, NextRun, RunReading, rounded_down
+from verification.coupling.readings import NextRun, RunReading, rounded_down
 from verification.coupling.roles import Role, fewer, in_steps
 from verification.coupling.runs import Logs, OneRun, Runs
 from verification.coupling.runs_with_friction import FrictionBounds
@@ -29,6 +29,9 @@ from verification.coupling.waves import Waves
 from verification.document import Document
 from verification.interface.pair import UNITS
 from verification.problem import Problem
+
+#: Two thetas are the same in a sentence if they differ by less than this share.
+SAME_THETA = 5e-3
 
 
 def _because(name: str, why: str) -> Callable[[Advice], str]:
@@ -67,12 +70,19 @@ class Advice(Document):
             return None
         if self.next is not None:
             return self.next.theta
-        return rounded_down(min(Fraction(self.chosen(self.best)[0]), LARGEST_TO_PASTE))
+        return rounded_down(min(Fraction(self.chosen(self.best)[0]), self.coupling.most))
 
     @property
-    @says("whether the advice is for an interface of which nothing opens or slips, as `--tied` asks")
+    @says(
+        "the kind of coupling that was declared: `contact`, `tied` or `general`", name="kind", of=lambda kind: kind.name
+    )
+    def coupling(self) -> Kind:
+        return self.evidence.kind
+
+    @property
+    @says("whether nothing opens or slips: of kind `tied` and `general`, and where vectors show it")
     def tied(self) -> bool:
-        return self.evidence.kind.tied
+        return self.evidence.linear
 
     @property
     @says(
@@ -96,19 +106,21 @@ class Advice(Document):
         tied = self.tied and best.ends is not None
         theta, rate = self.chosen(best)
         first = "" if self.evidence.assumes is None else f"Assumed: {self.evidence.assumes}. "
-        first += f"rho (stiffness of contact body over Neumann body on the interface, at worst) is {_rho(best, tied)}"
+        of = "rho (stiffness of contact body over Neumann body on the interface, at worst)"
+        first += f"{of if self.coupling.signed else 'rho (the largest eigenvalue lambda)'} is {_rho(best, tied)}"
         if self.neumann_body is not None:
             words = self.evidence.words(self.neumann_body)
             first += f" with {words} as Neumann {words.split()[0]}"
         if other is not None:
             first += f", {_rho(other, tied)} with the roles exchanged"
-        formula = "2/(2+rho)"
         if tied and best.rho_min is not None:
-            formula = "2/(2+rho_min+rho)"
-            first += f"; rho_min (at best) is {best.rho_min.value:.3g}"
+            first += f"; rho_min ({'at best' if self.coupling.signed else 'the least'}) is {best.rho_min.value:.3g}"
+        if self.next is not None and abs(self.theta - theta) > SAME_THETA * theta:
+            return f"{first}. So relax by theta = {self.theta:.4g}: {self.next.why}."
         bound = "about " if best.level == "estimated" else "at most " * (tied or best.proved)
-        then = f"So relax by {formula} = {theta:.3g}: {bound}{in_steps(rate)} to 1e-9"
-        then += " if nothing opens or slips" if tied else " without friction" if best.proved else " are predicted"
+        then = f"So relax by {self._formula(best, theta)} = {theta:.3g}: {bound}{in_steps(rate)} to 1e-9"
+        linear = " if nothing opens or slips" if self.coupling.signed else " if the coupling is linear"
+        then += linear if tied else " without friction" if best.proved else " are predicted"
         if other is not None:
             away = in_steps(self.chosen(other)[1]).removesuffix(" steps")
             then += ", the same with the roles exchanged" if self.no_difference else f", against {away}"
@@ -117,19 +129,25 @@ class Advice(Document):
             then += self.steps_of("constant").removesuffix(" steps")
         return f"{first}. {then}."
 
+    def _formula(self, role: Role, theta: float) -> str:
+        """The formula that gives a theta, by its value; words where eigenvalues are complex, or have errors."""
+        assert role.rho is not None
+        rho, least = role.rho.value, None if role.rho_min is None else role.rho_min.value
+        forms = {"1/(1+rho)": 1 / (1 + rho)} if self.coupling.parallel else {"2/(2+rho)": 2 / (2 + rho)}
+        if least is not None and not self.coupling.parallel:
+            forms["2/(2+rho_min+rho)"] = 2 / (2 + least + rho)
+        near = (form for form in reversed(forms) if abs(forms[form] - theta) <= SAME_THETA * theta)
+        return next(near, "the theta of least factor over the eigenvalues and their errors")
+
     methods: tuple[MethodRow, ...] = key(
         "steps of a constant theta, of Aitken and of IQN-ILS, in the roles as they are and exchanged, predicted on the "
-        "spectrum as if contact did not change; empty while several readings of a run are left, of runs with friction, "
-        "of moduli, and of parallel coupling"
+        "spectrum as if contact did not change; while several readings of a run are left, only where rho is above 10 "
+        "by each of them; empty of runs with friction, and of moduli but of heat and fluids"
     )
     method: Advised | None = key(
         "the method that is advised",
-        null="where none arrives, or nothing decides, and for parallel coupling",
-        why=lambda advice: (
-            "parallel coupling"
-            if advice.parallel
-            else advice.why_no_theta or "no method arrives in the steps that are simulated"
-        ),
+        null="where none arrives, or nothing decides",
+        why=lambda advice: advice.why_no_theta or "no method arrives in the steps that are simulated",
     )
     roles: tuple[Role, ...] = key(
         "the assignment of the file first; for a run or for logs the one that they had, and none unless they decide"
@@ -262,7 +280,7 @@ class Advice(Document):
             neumann_body=body,
             roles=roles,
             methods=table,
-            method=methods.advised(table, tied=evidence.kind.tied, exchanged=exchanged),
+            method=methods.advised(table, tied=evidence.linear, exchanged=exchanged),
             next=evidence.next_run(),
         )
 
@@ -277,10 +295,7 @@ class Advice(Document):
 
     def chosen(self, role: Role) -> tuple[float, float]:
         """theta and rate by which this advice judges a role."""
-        for one in self.parallel:
-            if one.neumann_body == role.neumann_body and not one.bound:
-                return one.theta, one.factor
-        return role.advised(tied=self.tied and role.ends is not None)
+        return self.evidence.chosen(role)
 
     @property
     def why_no_theta(self) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,8 +15,9 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from ndtheory.constants import take
 from verification.algorithm.loop import Ending, Evaluation, Outcome, evaluations, follow
-from verification.algorithm.relaxation import Rule, rule_of
+from verification.algorithm.relaxation import InverseStep, Rule, rule_of
 from verification.coupling.advice import Advice
+from verification.coupling.kinds import kind_of
 from verification.coupling.spectrum import Spectrum
 from verification.coupling.vectors import seen_in
 from verification.interface.matrices import real_array
@@ -26,8 +26,12 @@ from verification.value import Value
 #: The factor of the first step where none is given.
 FIRST = Fraction(1, 2)
 
-#: Number of iterates, with their images, from which eigenvalues are read.
-REMEMBERED = 20
+#: Number of iterates, with their images, from which eigenvalues are read: the last ones, and where nothing opens the
+#: first FIRST_ONES too, in which the modes are that have died out since.
+REMEMBERED, FIRST_ONES = 20, 10
+
+#: The size of a field that a parallel coupling has not seen to change.
+UNKNOWN = 1.0
 
 #: Number of steps over which the pace of the residual is measured.
 PACE = 4
@@ -45,6 +49,9 @@ class CouplingError(RuntimeError):
 class Coupling:
     """The next force of a coupling whose loop is yours, and what its vectors show.
 
+    In *parallel* coupling its vectors have both fields, the force and behind it the displacement, of one length.  Each
+    is measured by its first residual, so that no unit counts.
+
     In a loop over time call :meth:`new_step` at the start of each step, and :meth:`see` for the last evaluation of it.
     It may be copied and pickled, for restarts and for steps in time that are tried again.
 
@@ -53,12 +60,22 @@ class Coupling:
     rule : {'constant', 'aitken', 'anderson', 'iqn-ils'} or Rule
         One that works on vectors.
     theta : number, optional
-        The constant factor, or the first one, 0 < theta <= 1; by default 1/2.
+        The constant factor, or the first one, 0 < theta <= 1, and up to 100 of kind general; by default 1/2.
+    kind : {'contact', 'tied', 'general'}
+        What the vectors are read as; contact has zeros where nodes are open, general may have positive feedback.
+    parallel : bool
+        True if both solvers run at once, each on the old data of the other.
+    reuse : int
+        Steps in time whose changes IQN-ILS uses again in the next one, if they show what newer ones do not.
+    absolute : float
+        :attr:`arrived` is True as well where ``|Tg - g| <= absolute``.
+    tolerance : float
+        :attr:`arrived` is True where ``|Tg - g| <= tolerance |Tg|``, of each field.
 
     Raises
     ------
     ValueError
-        A rule that needs both bodies, or no such rule; a theta outside its range.
+        A rule that needs both bodies, or no such rule; no such kind; numbers outside their range.
 
     Examples
     --------
@@ -70,12 +87,26 @@ class Coupling:
     (0.5, 3.0, 0.3636)
     """
 
-    def __init__(self, rule: Rule | str = "iqn-ils", theta: float | Fraction | str | None = None) -> None:
-        self.rule = rule_of(rule)
-        needed = "the relaxation factor, 0 < theta <= 1"
-        self.theta = float(FIRST if theta is None else take("theta", theta, needed, lambda value: 0 < value <= 1))
+    def __init__(
+        self,
+        rule: Rule | str = "iqn-ils",
+        theta: float | Fraction | str | None = None,
+        *,
+        kind: str = "contact",
+        parallel: bool = False,
+        absolute: float = 0.0,
+        tolerance: float = 1e-6,
+        reuse: int = 0,
+    ) -> None:
+        self.rule, self.kind = rule_of(rule), kind_of(kind, parallel=parallel)
+        needed, most = f"the relaxation factor, {self.kind.thetas}", self.kind.longest
+        self.theta = float(FIRST if theta is None else take("theta", theta, needed, lambda value: 0 < value <= most))
+        self.tolerance = float(take("tolerance", tolerance, "a number > 0", lambda value: value > 0))
+        self.absolute = float(take("absolute", absolute, "a number >= 0", lambda value: value >= 0))
+        self.reuse = int(take("reuse", reuse, "a whole number >= 0", lambda value: 0 <= value == int(value)))
         self._following = self.rule.on_vectors(self.theta)
-        self._seen: deque[tuple[Floats, Floats, bool]] = deque(maxlen=REMEMBERED)
+        self._scale: Floats | None = None
+        self._seen: list[tuple[Floats, Floats, bool]] = []
         self._anew = True
         self._advice: Advice | None = None
 
@@ -89,9 +120,11 @@ class Coupling:
         Parameters
         ----------
         g : array, shape (n,), or number
-            The force of this evaluation: the one that was returned before, or any other.
+            The force of this evaluation: the one that was returned before, or any other; in parallel coupling with the
+            displacement behind it, shape (2 n,).
         Tg : array, shape (n,), or number
-            What the contact body answered, not relaxed.
+            What the contact body answered, not relaxed; in parallel coupling what it answered to that displacement,
+            and behind it what the Neumann body answered to that force.
 
         Raises
         ------
@@ -99,20 +132,57 @@ class Coupling:
             Other shapes, or numbers that are not finite.
         """
         self.see(g, Tg)
-        return self._following(*self._seen[-1][:2])
+        return self.relaxed(*self._seen[-1][:2])
+
+    def relaxed(self, g: Floats, Tg: Floats) -> Floats:
+        """The next force after an evaluation that was taken in."""
+        if not self.kind.parallel:
+            return self._following(g, Tg)
+        if self._scale is None:
+            sizes = [float(np.linalg.norm(r)) or UNKNOWN for r in np.split(Tg - g, 2)]
+            self._scale = np.repeat(sizes, len(g) // 2)
+        return self._following(g / self._scale, Tg / self._scale) * self._scale
+
+    @property
+    def _fields(self) -> list[tuple[float, float]]:
+        """``|Tg - g|`` and ``|Tg|`` of each field in the last evaluation."""
+        g, Tg = (np.split(v, 1 + self.kind.parallel) for v in self._seen[-1][:2])
+        return [(float(np.linalg.norm(b - a)), float(np.linalg.norm(b))) for a, b in zip(g, Tg, strict=True)]
+
+    @property
+    def residual(self) -> float:
+        """``|Tg - g| / |Tg|`` of the last evaluation, in parallel coupling of the field where it is larger."""
+        return max(r / size if size else math.inf if r else 0.0 for r, size in self._fields)
+
+    @property
+    def arrived(self) -> bool:
+        """True if the last evaluation is within the tolerance, each field of parallel coupling by itself."""
+        return all(r <= max(self.tolerance * size, self.absolute) < math.inf for r, size in self._fields)
 
     def see(self, g: Any, Tg: Any) -> None:
         """Take in an evaluation without asking for the next force; parameters and errors as for :meth:`next`."""
         g = _vector("g", g, len(self._seen[-1][0]) if self._seen else None)
         self._seen.append((g, _vector("Tg", Tg, len(g)), self._anew))
+        if self.kind.parallel and len(g) % 2:
+            raise ValueError(f"g has {len(g)} numbers: needed both fields, of one length, as the coupling is parallel")
+        if len(self._seen) > REMEMBERED:
+            left = FIRST_ONES if self.kind.linear else 0
+            begins = self._seen.pop(left)[2]
+            x, Tx, anew = self._seen[left]
+            self._seen[left] = x, Tx, anew or begins
         self._anew, self._advice = False, None
 
     def new_step(self) -> None:
         """Begin another step in time: T has other loads.
 
-        The rule forgets what it has seen, and no difference of vectors across steps counts for the spectrum.
+        The rule forgets what it has seen except for the steps to ``reuse``.  No difference of vectors across steps
+        counts for the spectrum.
         """
-        self._following, self._anew = self.rule.on_vectors(self.theta), True
+        following, self._anew = self._following, True
+        if self.reuse and isinstance(following, InverseStep):
+            self._following = following.next_step(self.reuse)
+        else:
+            self._following, self._scale = self.rule.on_vectors(self.theta), None
 
     @property
     def advice(self) -> Advice | None:
@@ -120,7 +190,7 @@ class Coupling:
         if self._advice is None and len(self._seen) > 1:
             X, TX, starts = map(np.array, zip(*self._seen, strict=True))
             try:
-                self._advice = Advice.of(seen_in(X, TX, starts=starts))
+                self._advice = Advice.of(seen_in(X, TX, kind=self.kind, starts=starts))
             except ValueError:  # they do not differ above rounding
                 return None
         return self._advice
@@ -244,6 +314,9 @@ def couple(
     absolute: float = 0.0,
     max_iterations: int = 100,
     listen: Callable[[CouplingState], Any] | None = None,
+    kind: str = "contact",
+    parallel: bool = False,
+    twice: bool = False,
 ) -> Coupled:
     """Couple two solvers: ``T g = contact(neumann(g))``, relaxed by a rule until g and T g agree.
 
@@ -255,13 +328,18 @@ def couple(
         after the other, once for each evaluation of T, with arrays that they may change; what they raise reaches the
         caller, and nothing is called after it.
     start : array, shape (n,), or number
-        The first force.
-    rule, theta
+        The first force; the first displacement of parallel coupling is 0.
+    rule, theta, kind
         As for :class:`Coupling`.
     tolerance : float
         The coupling ends where ``|Tg - g| <= tolerance |Tg|``, in the Euclidean norm.
     absolute : float
         It ends as well where ``|Tg - g| <= absolute``, in the unit of g: where the solution is 0 nothing else does.
+    parallel : bool
+        True to call each solver with what the other one answered in the evaluation before, as if both ran at once.
+        Force and displacement are relaxed together, and each must meet the tolerance.
+    twice : bool
+        True to evaluate T at the start once more: that shows the noise of the solvers, and whether they have a memory.
     max_iterations : int
         The most evaluations of T; fewer where the residual runs away.
     listen : callable, optional
@@ -287,37 +365,43 @@ def couple(
     >>> found.converged, found.iterations, round(float(found.force[0]), 6), round(found.spectrum.high, 6)
     (True, 3, 1.714286, 0.75)
     """
-    coupling, g = Coupling(rule, theta), _vector("start", start)
-    tolerance = float(take("tolerance", tolerance, "a number > 0", lambda value: value > 0))
-    whole = lambda value: value >= 1 and value.denominator == 1
+    coupling = Coupling(rule, theta, kind=kind, parallel=parallel, absolute=absolute, tolerance=tolerance)
+    g, whole = _vector("start", start), lambda value: value >= 1 and value.denominator == 1
     max_iterations = int(take("max_iterations", max_iterations, "a whole number > 0", whole))
-    absolute = float(take("absolute", absolute, "a number >= 0", lambda value: value >= 0))
-    ending = Ending(tolerance, max_iterations - 1, patience=math.inf, growing=GROWING, absolute=absolute)
-    seen, displacement = list[Evaluation](), g
+    ending = Ending(0.0, max_iterations - 1, patience=math.inf, growing=GROWING)
+    seen, history, displacement = list[Evaluation](), list[float](), g
 
-    def T(g: Floats) -> Floats:
+    def T(x: Floats) -> Floats:
         nonlocal displacement
+        g, before = np.split(x, 2) if parallel else (x, None)
         displacement = _answer("neumann", neumann, g, len(seen) + 1)
-        return _answer("contact", contact, displacement, len(seen) + 1)
+        force = _answer("contact", contact, displacement if before is None else before, len(seen) + 1)
+        return np.concatenate([force, displacement]) if parallel else force
 
     def ended(found: Evaluation) -> Outcome | None:
         coupling.see(found.g, found.image)
-        outcome = ending.at(found.residual, found.scale)
+        history.append(coupling.residual)
+        outcome = ending.at(found.residual, math.inf)
+        if coupling.arrived:
+            outcome = Outcome.CONVERGED
         if listen is not None:
-            left = 0 if outcome is Outcome.CONVERGED else _steps_left(seen, tolerance)
+            left = 0 if outcome is Outcome.CONVERGED else _steps_left(history, coupling.tolerance)
             advice = coupling.advice
-            state = CouplingState(iterations=len(seen), residual=found.relative, steps_left=left, advice=advice)
+            state = CouplingState(iterations=len(seen), residual=history[-1], steps_left=left, advice=advice)
             if listen(state) is True and outcome is not Outcome.CONVERGED:
                 return Outcome.INTERRUPTED
         return Outcome.DIVERGED if outcome is Outcome.LIMIT and _grows(seen) else outcome
 
-    outcome = follow(evaluations(T, coupling._following, g), ended, seen)
+    begin = np.concatenate([g, 0 * g]) if parallel else g
+    if twice:
+        coupling.see(begin, T(begin))
+    outcome = follow(evaluations(T, coupling.relaxed, begin), ended, seen)
     return Coupled(
         outcome=outcome,
-        iterations=len(seen),
-        force=seen[-1].g,
+        iterations=len(seen) + twice,
+        force=seen[-1].g[: len(g)],
         displacement=displacement,
-        history=tuple(each.relative for each in seen),
+        history=tuple(history),
         advice=coupling.advice,
     )
 
@@ -343,9 +427,9 @@ def _grows(seen: list[Evaluation]) -> bool:
     return len(some) > PACE and all(before.residual < after.residual for before, after in pairwise(some))
 
 
-def _steps_left(seen: list[Evaluation], tolerance: float) -> int | None:
+def _steps_left(history: list[float], tolerance: float) -> int | None:
     """Steps to the tolerance at the pace of the last ones."""
-    first, last, steps = seen[-1 - PACE :][0].relative, seen[-1].relative, min(len(seen) - 1, PACE)
+    first, last, steps = history[-1 - PACE :][0], history[-1], min(len(history) - 1, PACE)
     if not 0 < last < first < math.inf:
         return None
     return max(math.ceil(math.log(tolerance / last) / (math.log(last / first) / steps)), 1)

@@ -73,16 +73,19 @@ class Box:
         return Box(a=(min(self.a[0], SOFT * self.b[1]), min(self.a[1], max(self.a[0], SOFT * self.b[1]))), b=self.b)
 
 
-#: What holds of every tied run: 0 <= lambda_min <= rho.
-EVERYTHING = Box(a=(1.0, math.inf), b=(1.0, math.inf))
+#: What holds of every tied run: 0 <= lambda_min <= rho; and of a run of any coupling.
+EVERYTHING, ANYTHING = (Box(a=(least, math.inf), b=(least, math.inf)) for least in (1.0, -math.inf))
 
 
-def of_ratio(theta: float, least: float, most: float) -> tuple[Box, Box]:
-    """Boxes of the steady ratio of a linear run: the softest mode is the slowest, or the stiffest one is."""
-    unsettled = SETTLED * (abs(1 - least) if most < 1 else 1 + most)
-    low, high = least - unsettled, most + unsettled
+def of_ratio(theta: float, least: float, most: float, *, rises: float = SETTLED) -> tuple[Box, Box]:
+    """Boxes of the steady ratio of a linear run: the softest mode is the slowest, or the stiffest one is.
+
+    A ratio below 1 may still rise by the share ``rises`` of its distance from 1.
+    """
+    unsettled = abs(1 - least) if most < 1 else 1 + most
+    low, high = least - SETTLED * unsettled, most + (rises if most < 1 else SETTLED) * unsettled
     softest, stiffest = ((1 - high) / theta, (1 - low) / theta), ((1 + low) / theta, (1 + high) / theta)
-    one, other = Box(a=softest, b=(1.0, stiffest[1])), Box(a=(softest[0], math.inf), b=stiffest)
+    one, other = Box(a=softest, b=(softest[0], stiffest[1])), Box(a=(softest[0], math.inf), b=stiffest)
     return one, other
 
 
@@ -91,9 +94,9 @@ def of_stiffest(least: float, most: float = math.inf) -> tuple[Box]:
     return (Box(a=EVERYTHING.a, b=(least, most)),)
 
 
-def common(each: Iterable[Sequence[Box]]) -> list[Box]:
-    """Boxes that logs leave together, each of which leaves some; empty where they exclude each other."""
-    left = [EVERYTHING]
+def common(each: Iterable[Sequence[Box]], all_of: Box = EVERYTHING) -> list[Box]:
+    """Boxes of ``all_of`` that logs leave together, each of which leaves some; empty where they exclude each other."""
+    left = [all_of]
     for boxes in each:
         met = [found for one in left for other in boxes if (found := one.meets(other)) is not None]
         left = [

@@ -13,8 +13,8 @@ from verification.coupling import methods
 from verification.coupling.kinds import CONTACT, BodyNumber, Kind
 from verification.coupling.layers import RoleOfLayers
 from verification.coupling.methods import MethodRow
-from verification.coupling.readings import LARGEST_TO_PASTE, NextRun
-from verification.coupling.roles import Role, best_of, estimated
+from verification.coupling.readings import NextRun
+from verification.coupling.roles import Role, estimated, fewer
 from verification.coupling.spectrum import Spectrum
 from verification.problem import Problem
 
@@ -27,7 +27,9 @@ class Parallel(Part):
 
     neumann_body: BodyNumber | None = key("the body with the Neumann problem", type="integer")
     theta: float = key(
-        r"$1/(1+\rho)$ and its factor a step, $\sqrt{\rho/(1+\rho)}$, where nothing opens or slips", unit="1"
+        r"$1/(1+\rho)$ and its factor a step, $\sqrt{\rho/(1+\rho)}$, where nothing opens or slips; by all eigenvalues "
+        "where these are estimates, or any may be",
+        unit="1",
     )
     factor: float = key(
         r"$1/(1+\rho)$ and its factor a step, $\sqrt{\rho/(1+\rho)}$, where nothing opens or slips", unit="1"
@@ -40,8 +42,12 @@ class Parallel(Part):
     def of(cls, role: Role) -> Parallel:
         """For a role that is not refused."""
         assert role.rho is not None
-        theta = parallel_theta(role.rho.value)
-        factor = parallel_factor(theta, role.rho.value)
+        if role.level == "estimated" and role.spectrum is not None:
+            both = role.spectrum.parallel()
+            theta, factor = both.theta, both.factor(both.theta)
+        else:
+            theta = parallel_theta(role.rho.value)
+            factor = parallel_factor(theta, role.rho.value)
         return cls(neumann_body=role.neumann_body, theta=theta, factor=factor, bound=role.level == "bounded")
 
 
@@ -61,6 +67,11 @@ class Evidence(Part, ABC):
     #: Why keys of the document are null, where that is another reason than usual.
     reasons: ClassVar[Mapping[str, str]] = {}
 
+    @property
+    def linear(self) -> bool:
+        """True if nothing opens or slips."""
+        return self.kind.linear
+
     @abstractmethod
     def spectra(self) -> tuple[Role, ...]:
         """For each assignment of the roles what is known of both ends of its spectrum, the one that there is first.
@@ -70,35 +81,52 @@ class Evidence(Part, ABC):
         """
 
     def prefers(self, roles: Sequence[Role]) -> BodyNumber | None:
-        """The body that should get the Neumann problem; None where that is not known."""
-        return best_of(roles, tied=self.kind.tied).neumann_body if roles else None
+        """The body that should get the Neumann problem; None where that is not known.
+
+        It takes fewer steps; the first role stays where it makes no difference, or where the other one is refused.
+        """
+        possible = [role for role in roles if role.rho is not None]
+        faster = (role for role in possible[1:] if fewer(self.chosen(role)[1], self.chosen(possible[0])[1]))
+        return next(faster, possible[0]).neumann_body if roles else None
+
+    def chosen(self, role: Role) -> tuple[float, float]:
+        """theta and rate by which a role is judged."""
+        if self.kind.parallel and role.level != "bounded":
+            of = Parallel.of(role)
+            return of.theta, of.factor
+        return role.advised(tied=self.linear and role.ends is not None)
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
-        """The methods in all roles whose rho is known, the first role's own ones first; none for parallel coupling.
+        """The methods in all roles whose rho is known, the first role's own ones first.
 
         Contact that may open has a mode with lambda = 0 besides.
         """
-        known = [role for role in roles if role.rho is not None and role.level != "bounded" and not self.kind.parallel]
+        known = [role for role in roles if role.rho is not None and role.level != "bounded"]
         return tuple(row for role in known for row in self.in_role(role, exchanged=role is not roles[0]))
 
     def in_role(
         self, role: Role, *, tied: bool | None = None, theta: float | None = None, **settings: bool
     ) -> tuple[MethodRow, ...]:
         """The methods in one role, for its own theta or another one; ``settings`` as of :func:`methods.rows`."""
-        tied = self.kind.tied if tied is None else tied
+        tied = self.linear if tied is None else tied
         assert role.rho is not None
         spectrum = role.spectrum or Spectrum.between(float(role.ends[0] if role.ends else 0), role.rho.value)
-        if theta is None:
-            theta = min(role.advised(tied=tied and role.ends is not None)[0], float(LARGEST_TO_PASTE))
         spectrum = spectrum if tied else spectrum.with_open_nodes()
+        if theta is None:
+            theta = self.chosen(role)[0] if self.kind.parallel else role.advised(tied=tied and role.ends is not None)[0]
+        spectrum, theta = spectrum.parallel() if self.kind.parallel else spectrum, min(theta, float(self.kind.most))
         return methods.rows(spectrum, theta=theta, neumann_body=role.neumann_body, **settings)
 
     def on_estimates(self, spectrum: Spectrum, of: str) -> tuple[MethodRow, ...]:
         """The methods on an estimated spectrum, in which open nodes are already, and with the roles exchanged."""
-        rows = self.in_role(estimated(spectrum, of), tied=True, exchanged=False)
+        rows = self.in_role(self.estimated(spectrum, of), tied=True, exchanged=False)
         if spectrum.low - spectrum.error_low > 0:
-            rows += self.in_role(estimated(spectrum.exchanged(), of), tied=True, exchanged=True)
+            rows += self.in_role(self.estimated(spectrum.exchanged(), of), tied=True, exchanged=True)
         return rows
+
+    def estimated(self, spectrum: Spectrum, of: str) -> Role:
+        """The role of a spectrum that was read from something, under this kind."""
+        return estimated(spectrum, of, least=self.kind.least)
 
     def next_run(self) -> NextRun | None:
         """The run to make next; None where there is nothing to run."""

@@ -13,15 +13,14 @@ from ndtheory import HypothesisError
 from ndtheory.constants import SMALLEST, take
 from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.number import below
-from verification.coupling import ends
+from verification.coupling import ends, general
 from verification.coupling.accelerated import after_accelerated, seen_accelerated, spectrum_of
 from verification.coupling.advice import Advice
 from verification.coupling.ends import DEAR, SETTLED, Box
-from verification.coupling.kinds import kind_of
+from verification.coupling.kinds import CONTACT, LARGEST_TO_PASTE, Kind, kind_of
 from verification.coupling.log_files import Log, read_log
 from verification.coupling.pace import CONVERGED, RELATIVE, Pace
 from verification.coupling.readings import (
-    LARGEST_TO_PASTE,
     SHORTEST_STEP,
     NextRun,
     Observed,
@@ -32,13 +31,23 @@ from verification.coupling.readings import (
     level,
     pasted_or_not,
     read_observed,
+    read_parallel,
     read_plateau,
     rounded_down,
     steps_needed,
 )
 from verification.coupling.runs import Logs, decided
 from verification.coupling.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
-from verification.coupling.seen import AGREE, LogBound, RhoInterval, SeenColumn, SeenLog, bounds, seen_column
+from verification.coupling.seen import (
+    AGREE,
+    LogBound,
+    RhoInterval,
+    SeenColumn,
+    SeenLog,
+    bounds,
+    of_both_fields,
+    seen_column,
+)
 from verification.problem.tables import ProblemError
 
 #: Readings that are left, the run to make next, and rho where the logs decide it.
@@ -53,6 +62,9 @@ UNNAMED = (
     "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
 )
 
+#: What windows show that are too short one by one.
+WINDOWS = "windows show no ratio one by one; their second halves have a ratio of {} together"
+
 #: A window too short to be read does not converge where it has FEW steps, and its last residual is this share of the
 #: largest one.
 LARGE, FEW = 0.9, 5
@@ -62,7 +74,15 @@ SMALLEST_THETA = Fraction(1, 10**6)
 
 
 def advise_logs(
-    logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, friction: bool = False, pattern: str | None = None
+    logs: Iterable[tuple[Path | str, Any]],
+    *,
+    tied: bool = False,
+    friction: bool = False,
+    pattern: str | None = None,
+    kind: str | Kind | None = None,
+    parallel: bool = False,
+    format: str | None = None,
+    log10: bool = False,
 ) -> Advice:
     """Advice from the convergence logs of runs of any code, with a constant theta or with Aitken.
 
@@ -86,12 +106,17 @@ def advise_logs(
     (:mod:`verification.coupling.accelerated`), and with ``tied`` they decide theta where no log with constant theta
     does. Logs of quasi-Newton runs show only how many iterations they took.
 
+    Of a coupling of kind general each log shows one end of the spectrum and limits the other
+    (:mod:`verification.coupling.general`); in *parallel* coupling the stiffest mode is the slowest in every log, so
+    that ``r^2 = (1 - theta)^2 + theta^2 rho``.
+
     The run to make next has a theta that no log has, unless its reason begins with "keep it" or "the same again".
 
     Parameters
     ----------
     logs : iterable of tuple
-        Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1; None
+        Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1 (100 of
+        kind general); None
         where the log names its factor, or the relaxation was not constant.
     tied : bool
         True if the interface is tied, so that nothing opens or slips.  A run is linear then, and the softest or the
@@ -102,6 +127,14 @@ def advise_logs(
     pattern : str, optional
         A regular expression for logs of another form: its one group is a residual, or its groups are named
         ``residual``, ``iteration``, ``theta`` and ``omega``, a factor of Aitken.
+    kind : {'contact', 'tied', 'general'}, optional
+        The kind of the coupling; ``tied`` is short for the second one.
+    parallel : bool
+        True if both solvers ran at once; the log should have the residuals of both fields.
+    format : str, optional
+        The name of a known format (:mod:`verification.coupling.log_formats`), where a log is not recognised by itself.
+    log10 : bool
+        True if residuals are decimal logarithms.
 
     Returns
     -------
@@ -115,7 +148,8 @@ def advise_logs(
     HypothesisError
         A theta outside its range, or none for a log that names none.
     ValueError
-        No log, friction of a tied interface, or a pattern that is none.
+        No log, friction where nothing slips or in parallel coupling, kind general in parallel coupling, no such kind,
+        or a pattern or format that is none.
 
     Examples
     --------
@@ -127,29 +161,39 @@ def advise_logs(
     >>> [reading.kind for reading in found.readings], round(found.best.rho.value, 6)
     (['mode-high'], 3.0)
     """
-    needed = "the theta of a log, 0 < theta <= 1 (1e-6 or more)"
-    allowed = lambda value: max(SMALLEST, SMALLEST_THETA) <= value <= 1
+    of = kind_of(kind, tied=tied, parallel=parallel)
+    needed = f"the theta of a log, {of.thetas} (1e-6 or more)"
+    allowed = lambda value: max(SMALLEST, SMALLEST_THETA) <= value <= of.longest
     number = lambda theta: None if theta is None else take("theta", theta, needed, allowed)
     given = [(Path(path), number(theta)) for path, theta in logs]
     if not given:
         raise ValueError("needed one log or more")
-    assumed(tied, friction)  # one of both at most
-    read = [(read_log(path, pattern), theta) for path, theta in given]
+    assumed(of, friction)  # what goes together
+    read = [(read_log(path, pattern, name=format, log10=log10), theta) for path, theta in given]
+    read = [(of_both_fields(log) if of.parallel else log, theta) for log, theta in read]
     accelerated = tuple(seen_accelerated(log) for log, _ in read if log.accelerator is not None)
-    seen = tuple(seen_log(log, _theta_of(log, theta), friction) for log, theta in read if log.accelerator is None)
-    spectrum, made = spectrum_of(accelerated), [log.made for log in seen]
-    known: dict[str, Any] = {"kind": kind_of(tied=tied), "rubs": friction, "accelerated": accelerated, "logs": seen}
+    seen = tuple(seen_log(log, _theta_of(log, theta), of, friction) for log, theta in read if log.accelerator is None)
+    spectrum, made = spectrum_of(accelerated, of), [log.made for log in seen]
+    known: dict[str, Any] = {"kind": of, "rubs": friction, "accelerated": accelerated, "logs": seen}
     if not seen:
-        known |= {"spectrum": spectrum if tied else None, "interval": interval_of([], [])}
-        return Advice.of(Logs(readings=(), rho=None, next=after_accelerated(spectrum, tied), **known))
-    interval = interval_of(*(([], []) if friction else bounds(seen)))
-    readings, following, rho = with_friction(seen) if friction else decide(seen, interval, tied)
-    with_it = friction_bounds(*by_kind(seen)) if friction else None
-    found = Logs(
-        **decided(made, readings, following, rho, tied=tied, friction_bounds=with_it), interval=interval, **known
-    )
-    if found.rho is None and tied and spectrum is not None and interval.contradiction is None:
-        paste = pasted_or_not(after_accelerated(spectrum, tied), made)
+        known |= {"spectrum": spectrum if of.linear else None, "interval": interval_of([], [])}
+        return Advice.of(Logs(readings=(), rho=None, next=after_accelerated(spectrum, of), **known))
+    interval = interval_of(*(([], []) if friction or not of.signed else bounds(seen, parallel=of.parallel)))
+    if not of.signed:
+        steady = [(log.theta, log.slowest) for log in seen if not log.explodes]
+        boxes = [general.boxes_of(at, ratio) for at, ratio in steady if ratio is not None]
+        following, ends_seen = general.decide(boxes, made)
+        readings = () if ends_seen else next((log.readings for log in seen if log.readings), ())
+        found = Logs(readings=readings, rho=None, next=following, spectrum=ends_seen, interval=interval, **known)
+    else:
+        readings, following, rho = with_friction(seen) if friction else decide(seen, interval, of)
+        with_it = friction_bounds(*by_kind(seen)) if friction else None
+        found = Logs(
+            **decided(made, readings, following, rho, kind=of, friction_bounds=with_it), interval=interval, **known
+        )
+    undecided = found.rho is None and found.spectrum is None and interval.contradiction is None
+    if undecided and of.linear and spectrum is not None:
+        paste = pasted_or_not(after_accelerated(spectrum, of), made)
         found = found if paste is None else replace(found, spectrum=spectrum, next=paste)
     return Advice.of(found)
 
@@ -163,7 +207,7 @@ def _theta_of(log: Log, theta: Fraction | None) -> Fraction:
     return Fraction(repr(log.theta))
 
 
-def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
+def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = False) -> SeenLog:
     """One log as it was seen, with its readings."""
     off = max(log.theta_rounding, 1e-3 * float(theta))
     if log.theta is not None and abs(log.theta - float(theta)) > off * (1 + 1e-9):
@@ -182,11 +226,20 @@ def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
     )
     ratio, plateau, rho = bare.slowest, bare.plateau, None
     grows = ratio is not None and ratio.least > 1
-    if ratio is not None and grows:
+    if not kind.signed:
+        return bare if ratio is None else replace(bare, readings=general.readings_of(theta, ratio))
+    if kind.parallel and (ratio is not None or bare.stays):
+        ratio = Observed.known(Fraction(1)) if ratio is None else ratio
+        readings, following, rho = read_parallel(theta, ratio, linear=kind.linear)
+    elif ratio is not None and grows:
         readings, following, _ = read_observed(theta, ratio)
         if plateau is not None and one_mode(theta, ratio, plateau):
             also = [reading for reading in read_plateau(theta, plateau)[0] if reading.kind == "plateau"]
             readings = (*readings[:1], *also, *readings[1:])
+        if bare.explodes:
+            least = (1 + ratio.least) / theta - 1
+            why = f"2/(2 + rho) with rho = {few(least)}, the least one whose residual grows so fast"
+            following = NextRun(theta=rounded_down(predicted_theta(least)), why=why)
     elif plateau is not None:
         readings, following = read_plateau(theta, plateau)
         if (other := bare.rho_elsewise) is not None:
@@ -201,17 +254,25 @@ def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
         if not bare.converges and all(reading.kind != "level" for reading in readings):
             readings, rho = (*readings, level(theta, bounds=False)), None
     else:
-        return bare if bare.pooled is None else replace(bare, next=of_pooled(theta, bare.pooled))
+        return bare if bare.pooled is None else of_windows(bare, bare.pooled, friction)
     if friction:
         readings, rho = readings_with_friction(readings), None
     return replace(bare, readings=readings, next=following, rho=rho)
 
 
+def of_windows(bare: SeenLog, ratio: Observed, friction: bool) -> SeenLog:
+    """A log whose windows show no ratio one by one: beyond ``1 - theta`` only the stiffest mode has their pace."""
+    following = of_pooled(bare.theta, ratio)
+    if friction or ratio.value <= 1 - bare.theta:
+        return replace(bare, next=following)
+    (reading, *_), best, _ = read_observed(bare.theta, Observed.known(ratio.value))
+    following = following if following.kept else replace(best, why=f"{WINDOWS.format(ratio)}: {best.why}")
+    return replace(bare, readings=(reading,), next=following)
+
+
 def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
     """The run to make where the windows of a transient show no ratio one by one."""
-    why = (
-        f"windows show no ratio one by one; their second halves have a ratio of {ratio} together, which bounds nothing"
-    )
+    why = WINDOWS.format(ratio)
     if ratio.most <= ends.SWIFT:
         return kept(theta, f"{why}, and none much faster is to be found")
     following = read_observed(theta, ratio, converges=False)[1]
@@ -269,7 +330,7 @@ def interval_of(lower: list[LogBound], upper: list[LogBound]) -> RhoInterval:
     return RhoInterval(lo=lo, hi=hi, contradiction=contradiction)
 
 
-def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, tied: bool) -> Decision:
+def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Decision:
     """The readings that are left, the run to make next, and rho where the logs decide."""
     falling = [log for log in logs if log.converges]
     rising = [log for log in logs if log.diverges]
@@ -282,11 +343,13 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, tied: bool) -> Deci
     if interval.contradiction is not None:
         why = "half of the smallest theta, in one time window, with ResAbs in the log: the logs contradict each other"
         return base.readings, NextRun(theta=_half(logs), why=why), None
-    lo, hi = interval.lo, interval.hi
+    lo, hi, tied = interval.lo, interval.hi, kind.linear
     if (swift := next((log for log in logs if log.swift), None)) is not None and base.rho is None:
         why = f"{_within(swift.paces)}, and none much faster is to be found"
         return swift.readings, kept(swift.theta, why), None
-    by_all = lambda: by_ends(logs, base, None if lo is None else lo.value, tied)
+    if kind.parallel:
+        return base.readings, base.next, base.rho
+    by_all = lambda: by_ends(logs, base, None if lo is None else lo.value, kind)
     if tied and (found := by_all()) is not None:
         return found
     if base.rho is not None:
@@ -308,27 +371,32 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, tied: bool) -> Deci
         return found
     if not falling and len(rising) > 1:
         why = "a quarter of the smallest theta so far, as none converges; the log of that run narrows rho"
-        return base.readings, NextRun(theta=rounded_down(base.theta / 4), why=why), None
+        smaller = base.theta / 4
+        if lo is not None and predicted_theta(lo.value) < smaller:
+            smaller, why = predicted_theta(lo.value), f"2/(2 + {few(lo.value)}), as none converges"
+        return base.readings, NextRun(theta=rounded_down(smaller), why=why), None
     return base.readings, between(base, rising), None
 
 
-def boxes_of(log: SeenLog, tied: bool) -> list[Box]:
+def boxes_of(log: SeenLog, kind: Kind) -> list[Box]:
     """Limits of the ends of the spectrum by a log; in contact of the modes that are left near the solution."""
-    ratio, plateau, theta = log.slowest, log.plateau, float(log.theta)
+    ratio, plateau, theta, tied = log.slowest, log.plateau, float(log.theta), kind.linear
     left: list[Sequence[Box]] = []
-    if ratio is not None and (log.converges or (tied and ratio.least > 1)):
+    if ratio is not None and (log.converges or (tied and ratio.least > 1)) and not log.explodes:
         left.append(ends.of_ratio(theta, float(ratio.least), float(ratio.most)))
     if tied and log.diverges:
         left.append(ends.of_stiffest(2 * (1 - SETTLED) / theta))
+    if tied and ratio is not None and log.explodes:
+        left.append(ends.of_stiffest((1 + float(ratio.least)) / theta))
     if tied and plateau is not None:
         low, high = float(1 / (plateau.most - 1)), float(1 / (plateau.least - 1))
         left.append(ends.of_stiffest(1 + low * (1 - SETTLED), 1 + high * (1 + SETTLED)))
     return ends.common(left)
 
 
-def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, tied: bool) -> Decision | None:
+def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, kind: Kind) -> Decision | None:
     """The same by the limits that all logs give the ends of the spectrum; None where these do not limit rho."""
-    boxes = ends.common([boxes_of(log, tied) for log in logs])
+    boxes, tied = ends.common([boxes_of(log, kind) for log in logs]), kind.linear
     known, most = [float(log.theta) for log in logs], float(LARGEST_TO_PASTE)
     if not boxes:
         if not tied:
@@ -375,7 +443,7 @@ def _half(logs: Sequence[SeenLog]) -> float:
 
 def robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
     """The theta where rho is known and the softest mode is not: at most ``2/(2 + rho)``, best where nodes are open."""
-    boxes = [box.softened() for box in ends.common([boxes_of(log, False) for log in logs])]
+    boxes = [box.softened() for box in ends.common([boxes_of(log, CONTACT) for log in logs])]
     if not boxes:
         return best
     theta, dear = ends.cheapest(boxes, best.theta)

@@ -16,7 +16,7 @@ from fem1d2d.mesh import Floats
 from ndtheory import Number
 from verification.coupling.advice import Advice
 from verification.coupling.from_problems import ALL, of_problem
-from verification.coupling.kinds import BodyNumber, kind_of
+from verification.coupling.kinds import BodyNumber, Kind, kind_of
 from verification.coupling.roles import Role, plain_role, role_on, with_both_ends
 from verification.coupling.sides import (
     BODIES,
@@ -69,6 +69,8 @@ def advise_matrices(
     radius: float | None = None,
     kernel: Any = None,
     tied: bool = False,
+    kind: str | Kind | None = None,
+    parallel: bool = False,
     progress: Progress = silent,
 ) -> Advice:
     """Advice from the interface stiffness of both bodies: matrices, or operators for interfaces of any size.
@@ -112,6 +114,10 @@ def advise_matrices(
         The operator S of the law of friction as :func:`verification.build` takes it, in place of ``radius``.
     tied : bool
         True to advise for an interface where nothing opens or slips.
+    kind : {'contact', 'tied', 'general'}, optional
+        The kind of the coupling; of kind general eigenvalues of asymmetric matrices may be below 0.
+    parallel : bool
+        True if both solvers run at once.
     progress : callable
         Called with steps, value and residual of Lanczos.
 
@@ -122,7 +128,8 @@ def advise_matrices(
     Raises
     ------
     ValueError
-        Matrices or operators that are not a stiffness, do not fit, or leave no role.
+        Matrices or operators that are not a stiffness, do not fit, or leave no role; no such kind, or kind general
+        with friction.
 
     Examples
     --------
@@ -137,6 +144,9 @@ def advise_matrices(
     >>> found.neumann_body, round(found.best.rho.value, 9)
     (2, 0.75)
     """
+    of = kind_of(kind, tied=tied, parallel=parallel)
+    if friction is not None and not of.signed:
+        raise ValueError("friction with kind general: needed kind contact or tied")
     if neumann_body not in (None, 1, 2):
         raise ValueError(f"neumann_body {neumann_body!r}: needed 1 or 2")
     beside = {"x": x, "x_neumann": x_neumann, "weights": weights, "radius": radius, "kernel": kernel}
@@ -157,7 +167,9 @@ def advise_matrices(
     refused = _refused(sides, P, functions)
     lanczos: list[SeenLanczos] = []
     if friction is None:
-        roles = {body: _by_eigenvalues(body, sides, P) for body in BODIES if body not in refused and not functions}
+        roles = {
+            body: _by_eigenvalues(body, sides, P, of.least) for body in BODIES if body not in refused and not functions
+        }
         for body in BODIES:
             if functions and body not in refused:
                 roles[body], seen = _by_lanczos(body, sides, P, progress)
@@ -166,11 +178,11 @@ def advise_matrices(
         symmetric = all(side.seen.asymmetry is None or side.seen.asymmetry <= TOLD for side in sides.values())
         if not functions and P is None and not refused and symmetric:
             both = with_both_ends(both)
-        known: dict[str, Any] = {"kind": kind_of(tied=tied)}
+        known: dict[str, Any] = {"kind": of}
     else:
         pair = _with_friction(sides, P, 1 if 2 in refused else 2, friction, beside)
-        of_pair = of_problem(pair, tied=tied)
-        known = {name: getattr(of_pair, name) for name in ("kind", "friction", "outside")}
+        of_pair = of_problem(pair, tied=of.linear)
+        known = {"kind": of} | {name: getattr(of_pair, name) for name in ("friction", "outside")}
         # without a problem file "auto" has no meaning
         both = tuple(refused.get(role.neumann_body or 2, replace(role, theta_auto=None)) for role in of_pair.spectra())
     ordered = friction is not None or (P is not None and P.components > 1)
@@ -217,8 +229,8 @@ def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[BodyNumb
     return refused
 
 
-def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
-    """The role in which a body has the Neumann problem, by the spectrum of (P' S_c P, S_n)."""
+def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None, lowest: float) -> Role:
+    """The role in which a body has the Neumann problem, by the eigenvalues of (P' S_c P, S_n), which may be complex."""
     contact, neumann = sides[other(body)].matrix, sides[body].matrix
     assert contact is not None
     assert neumann is not None
@@ -226,7 +238,10 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
     S_c, S_n = contact.matrix / units[0], neumann.matrix / units[1]
     unit = Fraction(units[0]) / Fraction(units[1])
     if max(side.asymmetry for side in (contact, neumann)) > TOLD:
-        return _of_asymmetric(body, S_c if P is None else P.carry_back(P.carry_back(S_c.T).T), S_n, float(unit))
+        S_c = S_c if P is None else P.carry_back(P.carry_back(S_c.T).T)
+        with one_thread():
+            spectrum = Spectrum.of(np.linalg.eigvals(np.linalg.solve(S_n, S_c)) * float(unit))
+        return role_on(body, spectrum, least=lowest, nothing=WORD_OF_ASYMMETRY)
     if P is not None:
         S_c = P.carry_back(P.carry_back(S_c).T)
         S_c = (S_c + S_c.T) / 2
@@ -242,13 +257,6 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
             return role
     least = float(values[0])
     return replace(role, rho_min=Number.of_float(Fraction(least) * unit), rho_tied=role.rho)
-
-
-def _of_asymmetric(body: BodyNumber, S_c: Floats, S_n: Floats, unit: float) -> Role:
-    """The role by the complex eigenvalues of ``S_n^-1 S_c``."""
-    with one_thread():
-        spectrum = Spectrum.of(np.linalg.eigvals(np.linalg.solve(S_n, S_c)) * unit)
-    return role_on(body, spectrum, nothing=WORD_OF_ASYMMETRY)
 
 
 def _by_lanczos(body: BodyNumber, sides: Sides, P: Transfer | None, progress: Progress) -> tuple[Role, SeenLanczos]:

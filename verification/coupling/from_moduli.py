@@ -12,9 +12,9 @@ from ndtheory.constants import take
 from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
 from ndtheory.number import below
 from verification.coupling.advice import Advice
-from verification.coupling.kinds import BodyNumber, kind_of
+from verification.coupling.kinds import BodyNumber, Kind, kind_of
 from verification.coupling.seen_moduli import Corners, ElasticBodies, LowerBounds, ModuliRole, StartTheta
-from verification.coupling.waves import Fluid, Heat, read_waves, shown
+from verification.coupling.waves import Film, Fluid, Heat, read_waves, shown
 
 #: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.
 LARGEST_YOUNG, CLOSEST = 10**24, Fraction(1, 10**12)
@@ -28,12 +28,14 @@ def advise_moduli(
     corners: Corners | None = None,
     mirror: Collection[int] = (),
     flat: bool = False,
-    conductivity: Sequence[Any] | None = None,
+    conductivity: Any = None,
+    film: Any = None,
     capacity: Sequence[Any] | None = None,
     density: Sequence[Any] | None = None,
     thickness: Any = None,
     length: Any = None,
     dt: Any = None,
+    kind: str | Kind | None = None,
     parallel: bool = False,
 ) -> Advice:
     """Advice from the material data of two bodies, before there is a mesh: elastic, with heat, or a fluid at a wall.
@@ -54,8 +56,9 @@ def advise_moduli(
     (:func:`ndtheory.moduli.column`, :func:`ndtheory.moduli.layer`, :func:`ndtheory.moduli.end`).
 
     Two flat plates that exchange heat have both ends of their spectrum, hence a theta to paste and its factor
-    (:func:`ndtheory.moduli.conduction`).  A fluid at a wall, the Neumann body, has a lower bound of rho, the added mass
-    of the longest wave over the wall's own mass (:func:`ndtheory.moduli.added_mass`).  Both are tied.
+    (:func:`ndtheory.moduli.conduction`); so has a wall beside a fluid of a given film coefficient
+    (:func:`ndtheory.moduli.cooled`).  A fluid at a wall, the Neumann body, has a lower bound of rho, the added mass of
+    the longest wave over the wall's own mass (:func:`ndtheory.moduli.added_mass`).  All are tied.
 
     Parameters
     ----------
@@ -69,10 +72,15 @@ def advise_moduli(
     flat : bool
         True if a body into which such an image fits is at least twice as wide as high, and held along its other side.
     conductivity, capacity, density : pair of numbers
-        Of plates 1 and 2, the capacity per volume for a step in time; density of the fluid and of the wall.
+        Of plates 1 and 2, the capacity per volume for a step in time; density of the fluid and of the wall.  One number
+        each of a wall beside a film.
+    film : number
+        Film coefficient of a fluid at a wall, flux per temperature.
     thickness, length, dt : number or pair of numbers
         Thickness of the wall, or of both plates, which are thick without it; length of the wall between the lines that
         hold it, of a tube its length and radius; step in time.  All in one set of units.
+    kind : {'contact', 'tied'}, optional
+        Of elastic bodies, contact by default; heat and a fluid at a wall are tied.
     parallel : bool
         True if both solvers run at once, and both fields are relaxed.
 
@@ -83,7 +91,8 @@ def advise_moduli(
     Raises
     ------
     HypothesisError
-        Numbers out of their range, data of two kinds, or a mirror image that cannot fit with these corners.
+        Numbers out of their range, data of two kinds, another kind of coupling than these data are of, or a mirror
+        image that cannot fit with these corners.
 
     Examples
     --------
@@ -96,17 +105,31 @@ def advise_moduli(
     >>> heat = advise_moduli(conductivity=(50, "0.5"), capacity=("3.6e6", "1.6e6"))
     >>> heat.neumann_body, heat.theta, round(heat.best.rate_tied, 4)
     (1, 0.963, 0.0273)
+    >>> air = advise_moduli(film=10, conductivity=50, thickness="0.02")
+    >>> air.neumann_body, air.theta
+    (2, 0.99)
     >>> water = advise_moduli(density=(1000, 1200), thickness="1e-3", length=("0.05", "0.005"))
     >>> round(water.best.rho.value, 1), water.method.name
     (85.5, 'iqn-ils')
     """
-    waves = {"conductivity": conductivity, "capacity": capacity, "density": density, "length": length, "dt": dt}
+    of = kind_of(kind, parallel=parallel)
+    if not of.signed:
+        raise HypothesisError("kind", of.name, "contact or tied: moduli say nothing of other couplings")
+    waves = {
+        "film": film,
+        "conductivity": conductivity,
+        "capacity": capacity,
+        "density": density,
+        "length": length,
+        "dt": dt,
+    }
     given = {key: value for key, value in (waves | {"thickness": thickness}).items() if value is not None}
-    if conductivity is not None or density is not None:
+    if conductivity is not None or density is not None or film is not None:
         elastic = {"plane": plane != "strain" and plane, "corners": corners, "mirror": [*mirror], "flat": flat}
         given |= {key: value for key, value in elastic.items() if value}
         given |= {key: value for key, value in (("young", young), ("poisson", poisson)) if value is not None}
-        return Advice.of(read_waves(Fluid if conductivity is None else Heat, given, parallel=parallel))
+        source = Film if film is not None else Fluid if conductivity is None else Heat
+        return Advice.of(read_waves(source, given, parallel=of.parallel))
     for key, value in given.items():
         raise HypothesisError(key, shown(value), f"no {key} beside young: it belongs to conductivity or density")
     bodies = _bodies(young, poisson, plane)
@@ -123,8 +146,7 @@ def advise_moduli(
     if flat and not fits:
         raise HypothesisError("flat", flat, "a mirror image that fits (mirror)")
     roles = _role(1, bodies, corners, fits, flat), _role(2, bodies, corners, fits, flat)
-    kind = kind_of(tied=False, parallel=parallel)
-    return Advice.of(ElasticBodies(kind=kind, bodies=bodies, corners=corners, mirror=fits, flat=flat, roles=roles))
+    return Advice.of(ElasticBodies(kind=of, bodies=bodies, corners=corners, mirror=fits, flat=flat, roles=roles))
 
 
 def _bodies(young: Sequence[Any], poisson: Sequence[Any], plane: Plane) -> tuple[Moduli, Moduli]:

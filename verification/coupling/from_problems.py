@@ -47,7 +47,7 @@ class FromProblem(Evidence):
     @cached_property
     def layers(self) -> tuple[RoleOfLayers, ...]:
         """For a problem file whose bodies may slip and open."""
-        if self.problem is None or self.kind.tied:
+        if self.problem is None or self.kind.linear:
             return ()
         return tuple(of_layers(self.problem, self.friction or 0.0, self.roles))
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from verification.coupling.advice import Advice
+from verification.coupling.kinds import Kind, kind_of
 from verification.coupling.vectors import seen_in
 from verification.interface.matrices import real_array, size
 
 
-def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
+def advise_vectors(
+    X: Any, TX: Any, *, tied: bool = False, kind: str | Kind | None = None, parallel: bool = False
+) -> Advice:
     """Advice from a few iterates x of a run and their images T x, the run being relaxed by any method.
 
     T x is what the contact body answers to the displacement that the Neumann body has under the force x, before it is
@@ -24,6 +27,11 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
     tied : bool
         True if nothing opens or slips.  Otherwise, where the vectors show that contact changes, theta is chosen for
         open nodes as well.
+    kind : {'contact', 'tied', 'general'}, optional
+        Of a coupling that is not in contact entries that are 0 are data; of kind general eigenvalues may be below 0.
+    parallel : bool
+        True if both solvers run at once: then a row has the force and behind it the displacement, and its image what
+        the contact body answers to that displacement and the Neumann body to that force.
 
     Returns
     -------
@@ -36,7 +44,7 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
     Raises
     ------
     ValueError
-        Arrays of other shapes, entries that are not finite, or iterates that do not differ.
+        Arrays of other shapes, entries that are not finite, iterates that do not differ, or no such kind.
 
     Examples
     --------
@@ -49,6 +57,7 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
     >>> round(found.spectrum.low, 9), round(found.spectrum.high, 9), found.theta
     (0.5, 3.0, 0.3636)
     """
+    of = kind_of(kind, tied=tied, parallel=parallel)
     needed = "a row of real numbers for each iterate, two rows or more"
     given = [real_array(name, rows, (None, None), needed) for name, rows in (("X", X), ("TX", TX))]
     if given[0].shape != given[1].shape:
@@ -56,4 +65,8 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
         raise ValueError(f"X and TX are {shapes}: needed an image for each iterate, of the same length")
     if len(given[0]) < 2:
         raise ValueError(f"X is {size(given[0])}: needed {needed}")
-    return Advice.of(seen_in(*given, tied=tied))
+    if of.parallel and given[0].shape[1] % 2:
+        raise ValueError(
+            f"X is {size(given[0])}: needed both fields in a row, of one length, as the coupling is parallel"
+        )
+    return Advice.of(seen_in(*given, kind=of))

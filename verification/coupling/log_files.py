@@ -13,11 +13,12 @@ from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.coupling.log_lines import Form, Residual, form_of, form_of_pattern
+from verification.coupling.log_lines import ColumnsForm, Form, Residual, columns_of, form_of, form_of_pattern, to_try
 from verification.machine.interrupts import in_time
 from verification.problem.tables import ProblemError, short, unreadable
 
@@ -72,15 +73,17 @@ class Log:
     notes: tuple[str, ...] = ()
 
 
-def read_log(path: Path, pattern: str | None = None) -> Log:
-    """Read the residuals in a log, by its form or by a regular expression.
+def read_log(path: Path, pattern: str | None = None, *, name: str | None = None, log10: bool = False) -> Log:
+    """Read the residuals in a log, by its form, by the name of a format, or by a regular expression.
+
+    With ``log10`` its numbers are decimal logarithms.
 
     Raises
     ------
     ProblemError
         No such log, or one that is damaged other than in its last line.
     ValueError
-        A pattern that is none (:func:`verification.coupling.log_lines.form_of_pattern`).
+        A pattern that is none (:func:`verification.coupling.log_lines.form_of_pattern`), or no such format.
     """
     form = None if pattern is None else form_of_pattern(pattern)
     why = unreadable(path, MOST_BYTES)
@@ -90,10 +93,12 @@ def read_log(path: Path, pattern: str | None = None) -> Log:
     if not text.strip():
         raise _refused(path, "needed residuals, this file is empty")
     seconds = SECONDS + int(SECONDS_PER_CHARACTER * len(text))
-    form = form or form_of(text)
+    form = form or form_of(text, name)
+    if form is not None and form.refused:
+        raise _refused(path, form.refused)
     try:
         with in_time(seconds) if pattern is not None else nullcontext():
-            log = _LogTable(path, text).log() if form is None else _read_lines(path, text, form)
+            log = _table(path, text, log10) if form is None else _read_lines(path, text, form, log10)
     except TimeoutError:
         needed = f"searching it takes more than {seconds} s of processor time: needed no repeats inside repeats"
         raise _refused(path, f"{needed} (--pattern)") from None
@@ -102,6 +107,15 @@ def read_log(path: Path, pattern: str | None = None) -> Log:
             return log
         raise _refused(path, "needed residuals, every number of its columns is inf or nan")
     return replace(log, accelerator=log.accelerator or _quasi_newton_beside(path))
+
+
+def _table(path: Path, text: str, log10: bool) -> Log:
+    """Columns of numbers; a refusal of other logs says what may be tried."""
+    try:
+        return _LogTable(path, text, log10).log()
+    except ProblemError as error:
+        more = to_try(text)
+        raise ProblemError(error.file, error.key, error.value, f"{error.needed}{'; ' * bool(more)}{more}") from None
 
 
 def _refused(path: Path, needed: str, line: int = 0, received: str | None = None) -> ProblemError:
@@ -167,14 +181,14 @@ def _rounding(words: Sequence[str]) -> dict[str, float]:
 _ANSI = re.compile(r"\x1b\[[0-9;]*m")
 
 
-def _read_lines(path: Path, text: str, form: Form) -> Log:
+def _read_lines(path: Path, text: str, form: Form, log10: bool) -> Log:
     """The residuals that a code prints line by line.
 
     With an ``echo_level`` below 4 accelerators of Kratos do not name themselves, and any is taken for constant
     relaxation.
     """
     other = None if form.accelerator is None else form.accelerator.search(text)
-    found = _Lines(path)
+    found = _Lines(path, form.once, log10)
     for line, match in _matches(text, form):
         found.add(line, match)
     if not found.windows:
@@ -182,7 +196,8 @@ def _read_lines(path: Path, text: str, form: Form) -> Log:
     first = next(iter(found.windows.values()))
     windows = {name: _last_of(series) if form.again else series for name, series in found.windows.items()}
     factors = () if form.again else found.aligned([len(window) for window in first])
-    accelerator = None if other is None else other[1]
+    accelerator = None if other is None else form.renamed.get(other[1], other[1])
+    notes = (form.warns,) * bool(form.warns)
     values = found.factors
     if accelerator is None and form.every_step and len(values) + len(first) < sum(map(len, first)):
         accelerator = "quasi-Newton"  # which prints no factor
@@ -194,24 +209,26 @@ def _read_lines(path: Path, text: str, form: Form) -> Log:
     columns = tuple(
         Column(
             name=form.label.format(name),
-            residual=form.residual,
+            residual=form.kind_of(name),
             windows=tuple(map(np.array, series)),
             **_rounding(found.written[name][:LOOKED_AT]),
         )
         for name, series in windows.items()
     )
     if accelerator is not None or not values:
-        return Log(path=path, form=form.name, columns=columns, accelerator=accelerator, factors=factors)
+        rule: dict[str, Any] = {"accelerator": accelerator, "factors": factors}
+        return Log(path=path, form=form.name, columns=columns, notes=notes, **rule)
     theta, rounding = _number(values[0]), _rounding(values[:1])
     off = (rounding["digits"] * theta + rounding["decimals"]) * form.rounded
-    return Log(path=path, form=form.name, columns=columns, theta=theta, theta_rounding=off)
+    return Log(path=path, form=form.name, columns=columns, theta=theta, theta_rounding=off, notes=notes)
 
 
 class _Lines:
     """Residuals by field and window, and factors, as lines are read."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, once: bool, log10: bool) -> None:
+        self.path, self.once, self.log10 = path, once, log10
+        self.waits = not once
         self.windows: dict[str, list[list[float]]] = {}
         self.written: dict[str, list[str]] = {}
         self.factors: list[str] = []  # Kratos 10 writes one figure of a constant one
@@ -223,16 +240,18 @@ class _Lines:
     def add(self, line: int, match: re.Match[str]) -> None:
         """Take what a match has: the factor last, as it comes after the residual."""
         found = match.groupdict() or {"residual": match[1]}
+        self.waits = self.waits and (not self.once or any(found.values()))
         if found.get("iteration"):
             iteration = int(self._value(line, found["iteration"]))
             if self.fresh and iteration <= self.before:
                 self.fresh.clear()
                 self.after.append({})
-            self.before = iteration
+            self.before, self.waits = iteration, True
         if found.get("field"):
             self.field = found["field"].strip()
-        if word := found.get("residual"):
+        if self.waits and (word := found.get("residual")):
             value = self._value(line, word)
+            value, self.waits = 10.0**value if self.log10 else value, not self.once
             if value < 0:
                 raise _refused(self.path, "needed a residual >= 0", line, word)
             if self.field not in self.fresh:
@@ -282,7 +301,8 @@ def _matches(text: str, form: Form) -> Iterator[tuple[int, re.Match[str]]]:
 # --- columns of numbers -----------------------------------------------------------------------------------------------
 
 _COMMENT = ("#", "%", "!", "//")
-_PRECICE = re.compile(r"Res(\w*)\(.+\)")
+_PRECICE = re.compile(r"[Rr]es(\w*)\(.+\)")
+_QUASI_NEWTON = ("QNColumns", "DeletedColumns", "deleted_Columns")  # of preCICE 3, 2 and 1
 _RESIDUAL = re.compile(r"res|norm|err|abs|rel|drop")
 _WINDOWS = {"timewindow", "window", "timestep", "time", "increment", "loadstep"}
 _ITERATIONS = {"iteration", "iter", "it", "couplingiteration", "k", "n", "step"}
@@ -295,7 +315,7 @@ def _kind(name: str) -> Residual:
     precice = _PRECICE.fullmatch(name)
     word = (precice[1] if precice else name).lower()
     if precice:
-        return "absolute" if word == "abs" else "drop" if word == "drop" else "relative"
+        return "absolute" if word == "abs" else "drop" if word == "drop" else "relative"  # "norm" of versions 1 and 2.0
     if "drop" in word or "initial" in word:
         return "drop"
     return "relative" if "rel" in word else "absolute" if "abs" in word else "assumed"
@@ -304,8 +324,8 @@ def _kind(name: str) -> Residual:
 class _LogTable:
     """Columns of numbers, with names in their first line or without: of preCICE, and plain ones."""
 
-    def __init__(self, path: Path, text: str) -> None:
-        self.path = path
+    def __init__(self, path: Path, text: str, log10: bool = False) -> None:
+        self.path, self.log10 = path, log10
         self.lines = text.rstrip().split("\n")
         self.complete = text.endswith("\n")
         self.notes: list[str] = []
@@ -337,8 +357,9 @@ class _LogTable:
         """The log that the table is."""
         data = self._rows()
         names = self.names or self._commented(data.shape[1])
-        if {"Iterations", "QNColumns"} <= set(names) and len(names) == data.shape[1]:
-            counts, modes = (data[:, names.index(name)] for name in ("Iterations", "QNColumns"))
+        found = next((name for name in _QUASI_NEWTON if name in names), None)
+        if found is not None and "Iterations" in names and len(names) == data.shape[1]:
+            counts, modes = (data[:, names.index(name)] for name in ("Iterations", found))
             if modes.max() > 0:
                 return Log(
                     path=self.path,
@@ -347,6 +368,9 @@ class _LogTable:
                     accelerator=f"quasi-Newton, up to {int(modes.max())} columns",
                     counts=tuple(int(count) for count in counts),
                 )
+        table = columns_of(names)
+        if table is not None:
+            return self._of_table(table, names, data)
         iteration, window, theta, residuals = self._roles(names, data.shape[1])
         starts = self._starts(data, iteration, window)
         ends = self.numbers
@@ -354,6 +378,8 @@ class _LogTable:
             ends = ends[:LOOKED_AT] + ends[-LOOKED_AT:]
         words = list(zip(*(self._split(self.lines[line - 1]) for line in ends), strict=True))
         columns = []
+        if self.log10:
+            data[:, residuals] = 10.0 ** data[:, residuals]
         for i in residuals:
             wrong = np.flatnonzero(data[:, i] < 0)
             if wrong.size:
@@ -372,6 +398,25 @@ class _LogTable:
             factors=tuple(np.split(factors, starts)) if changes else (),
             notes=tuple(self.notes),
         )
+
+    def _of_table(self, table: ColumnsForm, names: Sequence[str], data: Floats) -> Log:
+        """The log of a format of columns that is known by their names."""
+        at = {name: i for i, name in enumerate(names)}
+        rows = data[data[:, at[table.only]] == 1] if table.only else data
+        fields = rows[:, at[table.split]] if table.split else np.zeros(len(rows))
+        columns = []
+        for which in np.unique(fields):
+            own = rows[fields == which]
+            begins = own[1:, at[table.iteration]] <= own[:-1, at[table.iteration]]
+            for name in filter(table.residuals.fullmatch, names):
+                values = 10.0 ** own[:, at[name]] if table.log10 else own[:, at[name]]
+                windows = tuple(np.split(values, np.flatnonzero(begins) + 1))
+                of = f"{name}, {table.split} {which:g}" if table.split else name
+                columns.append(Column(name=of, residual=table.residual, windows=windows, digits=1e-8, decimals=0.0))
+        if not columns:
+            raise _refused(self.path, table.refused)
+        notes = (*self.notes, *[table.warns] * bool(table.warns))
+        return Log(path=self.path, form=table.name, columns=tuple(columns), notes=notes)
 
     def _rows(self) -> Floats:
         """The numbers, a row a line; the last line may be cut off."""

@@ -108,12 +108,14 @@ def _start(started: Sequence[ModuliRole], first: NextRun | None, parallel: bool)
 
 @of.register
 def _of_heat(seen: Heat, found: Advice) -> Iterator[Section]:
-    names: Names = {1: "plate 1", 2: "plate 2"}
+    names: Names = {1: "the fluid", 2: "the wall"} if seen.first == "film" else {1: "plate 1", 2: "plate 2"}
     yield _setting(seen)
     body = found.neumann_body or 2
-    said = reads(names[body], names[3 - body], "fluxes", "temperatures")
-    same = found.no_difference and len({figures(role.rho_tied) for role in found.roles}) == 1
-    yield which_body(said, *["It makes no difference with the roles exchanged."] * same)
+    said = [reads(names[body], names[3 - body], "fluxes", "temperatures")]
+    said += [f"With the roles exchanged: {role.reason['rho']}." for role in found.roles if role.rho is None]
+    if found.no_difference and len({figures(role.rho_tied) for role in found.roles}) == 1:
+        said.append("It makes no difference with the roles exchanged.")
+    yield which_body(*said)
     yield _theta_of_heat(found, seen, names)
     yield from _parallel(found, names)
     yield from which_method(found, names)
@@ -145,27 +147,31 @@ def _setting(seen: Waves) -> Section:
 def _theta_of_heat(found: Advice, seen: Heat, names: Names) -> Section:
     """Both ends of the spectrum of two plates, and the theta for them."""
     rows: list[tuple[Cell, ...]] = []
-    for role in found.roles:
+    possible = [role for role in found.roles if role.rho is not None]
+    for role in possible:
         ends = figures(role.rho_min), figures(role.rho_tied)
         best = figures(role.theta_tied), near_one(role.rate_tied or 0)
         limit = None if role.rho_tied is None else excluded_from(role.rho_tied)
         rows.append((names[role.neumann_body or 2], *ends, *best, "never" if limit is None else figures(limit)))
     thick, dt = "thickness" not in seen.given, seen.one("dt")
-    notes = [
-        f"For flat {'thick ' * thick}plates: conductance of the plate that reads temperatures over the other one's, "
-        "least and largest over all waves of temperature, proved in the continuum; theta = 2/(2 + least + largest)."
-    ]
+    of, over = f"flat {'thick ' * thick}plates: conductance of the plate that reads temperatures", "the other one's"
+    if seen.first == "film":
+        of, over = f"a flat {'thick ' * thick}wall: the film coefficient", "the wall's conductance"
+    both = "least and largest over all waves of temperature, proved in the continuum"
+    notes = [f"For {of} over {over}, {both}; theta = 2/(2 + least + largest)."]
     if dt is not None:
         pairs = zip(seen.given["conductivity"], seen.given["capacity"], strict=True)
         reach = " and ".join(f"{3 * math.sqrt(k * dt / c):.3g}" for k, c in pairs)
-        notes.append(f"In dt heat reaches 3 sqrt(k dt/c), {reach}, into the plates; a thicker one counts as thick.")
+        notes.append(f"In dt heat reaches 3 sqrt(k dt/c), {reach}, into a plate; a thicker one counts as thick.")
     elif "capacity" in seen.given:
         notes.append("This holds for every step in time dt. A plate of more than 3 sqrt(k dt/c) counts as thick.")
-    if "capacity" in seen.given:
+    if "capacity" in seen.given and seen.first != "film":
         coarse = "Cells must be smaller than sqrt(k dt/c): with larger ones lambda is c times cell height over the same"
         notes.append(f"{coarse} of the other plate, and this theta may diverge.")
     elif not thick:
-        notes.append("Both plates are held at given temperatures on their other sides.")
+        held = "The wall is held at a given temperature on its other side."
+        plates = "Both plates are held at given temperatures on their other sides."
+        notes.append(held if seen.first == "film" else plates)
     if found.parallel:
         notes.append("These thetas and factors are for serial coupling.")
     heads = ("reads fluxes", "least", "largest", "theta", "factor a step", "diverges from")

@@ -56,7 +56,10 @@ MOST_WINDOWS = 300
 #: Windows that are too short one by one are pooled where there are so many.
 FEWEST_WINDOWS = 5
 
-Kind = Literal["steady", "level", "floor", "plateau", "unsteady", "short"]
+#: Two ratios between these at the end of a series that is too short show that it explodes: the last bounds the pace.
+EXPLODES, ABSURD = 1.5, 1e9
+
+Kind = Literal["steady", "level", "floor", "plateau", "unsteady", "short", "growth"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,6 +132,10 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
         steps = min(steps, max(FEWEST_STEPS, taken // 2))
     known: dict[str, Any] = {"length": len(residuals), "height": height, "arrived": arrived, "adapts": _adapts(values)}
     if taken < steps:
+        growth = values[-2:] / values[-3:-1] if taken > 1 and not relative else np.zeros(1)
+        if growth.min() > EXPLODES and growth.max() < ABSURD and values[-1] == values.max():
+            r = float(growth[-1])
+            return Pace(kind="growth", value=r, least=r * (1 - 1e-9), most=r, steps=taken, lost=lost, **known)
         return Pace(kind="short", steps=max(taken, int(arrived)), lost=lost, **known)
     known["steps"] = taken
     logs = np.log(values)

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar, Literal
 
-from ndtheory.energy_norms import predicted_theta
+from ndtheory.energy_norms import parallel_theta, predicted_theta
 from ndtheory.keys import Part, key
 from ndtheory.keys import says as means
 from ndtheory.number import below, directed
-
-#: The largest theta that is offered to paste.
-LARGEST_TO_PASTE = Fraction(99, 100)
+from verification.coupling.kinds import LARGEST_TO_PASTE, Kind
 
 #: A ratio must be steady over so many steps at least.
 FEWEST_STEPS = 10
@@ -172,7 +170,7 @@ def few(value: float | Fraction) -> str:
 def rounded_down(theta: float | Fraction) -> float:
     """A theta in four figures, not above the one meant; next to 1 in four figures of ``1 - theta``."""
     theta = Fraction(theta)
-    if theta > NEXT_TO_1:
+    if NEXT_TO_1 < theta < 1:
         return float(1 - directed(1 - theta, 4, up=True))
     return float(directed(theta, 4, up=False))
 
@@ -187,19 +185,25 @@ def spread(theta: Fraction) -> Fraction:
     return min(WIDEST, max(NARROWEST, theta / 2))
 
 
-def assumed(tied: bool, friction: bool) -> str:
+def assumed(kind: Kind, friction: bool) -> str:
     """The assumption under which runs are read.
 
     Raises
     ------
     ValueError
-        An interface that is tied, with friction.
+        Friction where nothing slips, or in parallel coupling; logs of kind general in parallel coupling.
     """
-    if tied and friction:
-        raise ValueError("tied with friction: needed one of them, as nothing slips on a tied interface")
+    if friction and kind.linear:
+        raise ValueError(f"{kind.name} with friction: needed one of them, as nothing slips on a {kind.name} interface")
+    if kind.parallel and (friction or not kind.signed):
+        what = "friction" if friction else "kind general"
+        raise ValueError(f"parallel with {what}: residuals say nothing then, needed vectors (ndtheory advise vectors)")
     if friction:
         return "there is friction, with which no ratio of residuals bounds rho"
-    return "nothing opens or slips" if tied else "no friction, or a tied interface"
+    if not kind.signed:
+        return "a linear coupling whose eigenvalues are real, and may be below 0"
+    both = ", and both solvers run at once" * kind.parallel
+    return ("nothing opens or slips" if kind.linear else "no friction, or a tied interface") + both
 
 
 # --- readings ---------------------------------------------------------------------------------------------------------
@@ -268,6 +272,29 @@ def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunRea
     return tuple(found)
 
 
+def rho_in_parallel(theta: Fraction, ratio: Fraction) -> Fraction:
+    """rho by the ratio of a *parallel* run: ``r^2 = (1 - theta)^2 + theta^2 rho``."""
+    return (ratio**2 - (1 - theta) ** 2) / theta**2
+
+
+def read_parallel(
+    theta: Fraction, ratio: Observed, *, linear: bool
+) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
+    """The same for *parallel* coupling, where each mode turns and the stiffest one is always the slowest."""
+    least, rho, most = (rho_in_parallel(theta, r) for r in (ratio.least, ratio.value, ratio.most))
+    if most < -SAME:
+        why = f"no such coupling falls faster than {few(1 - theta)} a step at {few(theta)}: is it serial?"
+        return (), NextRun(theta=rounded_down(theta / 2), why=f"half of it; {why}"), None
+    least, rho = max(least, Fraction(0)), max(rho, Fraction(0))
+    says = f"the stiffest mode turns and is the slowest: without friction, or tied, rho is at least {_at_least(least)}"
+    found = [RunReading(kind="mode-high", value=float(rho), lo=below(least), says=says)]
+    if not linear and ratio.most >= 1 - spread(theta):
+        found.append(level(theta))
+    why = f"1/(1 + rho) with rho = {few(rho)}"
+    decides = None if len(found) > 1 else rho
+    return tuple(found), NextRun(theta=rounded_down(min(parallel_theta(rho), LARGEST_TO_PASTE)), why=why), decides
+
+
 def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, ...], NextRun]:
     """The readings of a relative residual ``|T g - g|/|T g|`` that stays at P > 1, and the run to make next.
 
@@ -310,7 +337,7 @@ def _at_least(value: Fraction) -> str:
 
 def same_run(theta: Fraction | float, other: Fraction) -> bool:
     """True if a run with this theta shows nothing that one with the other does not."""
-    near = abs(Fraction(theta) - other) < ANEW * min(other, 1 - other)
+    near = abs(Fraction(theta) - other) < ANEW * (other if other > 1 else min(other, 1 - other))
     return near or f"{float(theta):g}" == f"{float(other):g}"
 
 

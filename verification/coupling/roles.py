@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Any, Literal
@@ -32,7 +32,7 @@ Level = Literal["known", "bounded", "estimated"]
 #: The entries of a role for a tied interface, in this order.
 TIED = ("rho_min", "rho_tied", "theta_tied", "rate_tied")
 
-_REFUSED = "from moduli, and where the role is refused"
+_REFUSED = "from moduli, where the role is refused, and of kind `general`"
 _NO_FILE = "where the advice is not about a problem file"
 _ENDS: dict[str, Any] = {
     "says": "the smallest and the largest eigenvalue of (S of the contact body, S of the Neumann body), in both "
@@ -118,7 +118,7 @@ class Role(Part):
         if self.rho_min is None or self.rho_tied is None:
             return None
         largest = Fraction(self.rho_tied.value)
-        return min(max(Fraction(self.rho_min.value), Fraction(0)), largest), largest  # both may be rounded past
+        return min(Fraction(self.rho_min.value), largest), largest  # which may be rounded past
 
     @property
     @says(
@@ -278,9 +278,9 @@ def role_of(
     )
 
 
-def role_on(neumann_body: BodyNumber | None, spectrum: Spectrum, **settings: Any) -> Role:
-    """The role of a spectrum, an end below 0 counting as 0; ``settings`` are parameters of :func:`role_of`."""
-    low, high = (Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high))
+def role_on(neumann_body: BodyNumber | None, spectrum: Spectrum, *, least: float = 0.0, **settings: Any) -> Role:
+    """The role of a spectrum, ends below ``least`` counting as that; ``settings`` are parameters of :func:`role_of`."""
+    low, high = (Number.of_float(max(end, least)) for end in (spectrum.low, spectrum.high))
     return role_of(neumann_body, high, rho_min=low, rho_tied=high, spectrum=spectrum, **settings)
 
 
@@ -289,10 +289,16 @@ def unnumbered(of: str) -> dict[str, str]:
     return {"neumann_body": f"{of} do not tell which body had the Neumann problem"}
 
 
-def estimated(spectrum: Spectrum, of: str) -> Role:
-    """The role of a spectrum that was estimated; ``of`` names what it was read from."""
+def estimated(spectrum: Spectrum, of: str, *, least: float = 0.0) -> Role:
+    """The role of a spectrum that was estimated; ``of`` names what it was read from, ``least`` is as in role_on."""
     nothing = f"{of}, from which eigenvalues were estimated, prove nothing"
-    return role_on(None, spectrum, nothing=nothing, reason=unnumbered(of), level="estimated")
+    role = role_on(None, spectrum, nothing=nothing, least=least, reason=unnumbered(of), level="estimated")
+    if least >= 0:
+        return role
+    why = dict.fromkeys(
+        ("theta_predicted", "rate_predicted"), "a coupling of kind general: no eigenvalue is known to be 0"
+    )
+    return replace(role, theta_predicted=None, rate_predicted=None, reason={**role.reason, **why})
 
 
 def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role:
@@ -314,12 +320,6 @@ def with_both_ends(roles: Sequence[Role], rho: Sequence[Number | None] = ()) -> 
     least = [Number.of_float(1 / Fraction(number.value)) for number in (other, one)]
     ends = zip(roles, least, (one, other), strict=True)
     return tuple(replace(role, rho_min=low, rho_tied=high) for role, low, high in ends)
-
-
-def best_of(roles: Iterable[Role], *, tied: bool = False) -> Role:
-    """The role that takes fewer steps; the first one where it makes no difference, or where the other is refused."""
-    first, *rest = (role for role in roles if role.rho is not None)
-    return next((role for role in rest if fewer(role.advised(tied=tied)[1], first.advised(tied=tied)[1])), first)
 
 
 def in_steps(rate: float) -> str:

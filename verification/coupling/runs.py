@@ -7,9 +7,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar
 
+from ndtheory.energy_norms import parallel_theta, predicted_theta
 from ndtheory.keys import key, says
+from ndtheory.number import below
+from verification.coupling import methods
 from verification.coupling.accelerated import Accelerated
 from verification.coupling.evidence import Evidence
+from verification.coupling.kinds import Kind
 from verification.coupling.methods import MethodRow
 from verification.coupling.readings import (
     AT_ONE,
@@ -23,13 +27,16 @@ from verification.coupling.readings import (
     pasted_or_not,
     steps_needed,
 )
-from verification.coupling.roles import Role, estimated, role_of
+from verification.coupling.roles import Role, role_of
 from verification.coupling.runs_with_friction import FrictionBounds
 from verification.coupling.seen import RhoInterval, SeenLog
 from verification.coupling.spectrum import Spectrum
 
 #: What a spectrum by Aitken's factors is read from.
 FACTORS = "Aitken's factors"
+
+#: From this rho on a constant theta takes many steps, whatever else the runs leave open: the methods are compared then.
+LARGE = 10.0
 
 #: Why nothing is known of the exchanged roles, and of the lower end of the spectrum.
 OF_ONE_RUN = {
@@ -42,7 +49,8 @@ OF_ONE_RUN = {
 class Runs(Evidence):
     """Runs of one coupling: possible ``readings``, bounds with friction, the ``next`` run, ``rho`` where it is decided.
 
-    Where they do ``next`` is the theta to paste.  ``rubs`` is True if there is friction.
+    Where they do ``next`` is the theta to paste.  ``rubs`` is True if there is friction; ``spectrum`` lies between the
+    ends that the runs show, where they show both.
     """
 
     readings: tuple[RunReading, ...]
@@ -50,20 +58,46 @@ class Runs(Evidence):
     rho: Fraction | None
     friction_bounds: FrictionBounds | None = None
     rubs: bool = False
+    spectrum: Spectrum | None = None
 
     #: Words for what was given.
     given_as: ClassVar[str]
 
     def spectra(self) -> tuple[Role, ...]:
-        """The roles of the runs, where they decide rho."""
+        """The roles of the runs, where they decide rho or the spectrum."""
+        if self.spectrum is not None:
+            return (self.estimated(self.spectrum, self.shows),)
         if self.rho is None:
             return ()
         return (role_of(None, self.rho, nothing="an observed ratio proves nothing", reason=OF_ONE_RUN),)
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
-        """For the theta to paste; only the largest eigenvalue is known."""
+        """For the theta to paste; on the spectrum, with the roles exchanged too, or where rho alone is known."""
+        if self.spectrum is not None:
+            return self.on_estimates(self.spectrum, self.shows)
+        if not roles and (rho := self.least_rho or 0.0) > LARGE and not self.rubs:
+            few_modes = Spectrum.between(0.0, rho)
+            theta = parallel_theta(rho) if self.kind.parallel else predicted_theta(rho)
+            few_modes = few_modes.parallel() if self.kind.parallel else few_modes
+            return tuple(
+                replace(row, bound="at least")
+                for row in methods.rows(few_modes, theta=theta, neumann_body=None, exchanged=False)
+            )
+        if self.kind.parallel:
+            return super().methods(roles)
         each = (self.in_role(role, theta=self.next.theta, exchanged=False, one_end=True) for role in roles)
         return tuple(row for rows in each for row in rows)
+
+    @property
+    def least_rho(self) -> float | None:
+        """rho is at least this, whichever reading is the right one; None where one of them does not bound it."""
+        bounds = [reading.lo for reading in self.readings if reading.lo is not None]
+        return min(bounds, default=None) if len(bounds) == len(self.readings) else None
+
+    @property
+    def shows(self) -> str:
+        """The source from which the spectrum is read."""
+        return self.given_as
 
     @property
     def decided(self) -> bool:
@@ -77,11 +111,11 @@ class Runs(Evidence):
     @property
     def assumes(self) -> str:
         """The assumption under which the runs are read."""
-        return assumed(self.kind.tied, self.rubs)
+        return assumed(self.kind, self.rubs)
 
     @property
     def why_no_theta(self) -> str:
-        if self.rho is not None:
+        if self.rho is not None or self.spectrum is not None:
             return ""
         if self.friction_bounds is not None:
             return "with friction no run decides theta: make the run that `next` names"
@@ -94,9 +128,14 @@ class Runs(Evidence):
 
 @dataclass(frozen=True, kw_only=True)
 class OneRun(Runs):
-    """A run of any code with constant theta, and the ratio of its absolute unrelaxed residual from step to step."""
+    """A run of any code with constant theta, and the ratio of its absolute unrelaxed residual from step to step.
+
+    ``earlier`` has theta and ratio of the runs before it, of a coupling of kind general.
+    """
 
     given_as = "a run"
+
+    earlier: tuple[tuple[Fraction, Fraction], ...] = ()
 
     theta: Fraction = key("as given", type="number", unit="1", of=float)
     ratio: Fraction = key("as given", type="number", unit="1", of=float)
@@ -110,10 +149,7 @@ class OneRun(Runs):
 
 @dataclass(frozen=True, kw_only=True)
 class Logs(Runs):
-    """Convergence logs of runs: of constant theta, and ``accelerated`` ones, with bounds of rho from all together.
-
-    ``spectrum`` lies between the ends that Aitken's factors show, where these decide theta.
-    """
+    """Convergence logs of runs: of constant theta, and ``accelerated`` ones, with bounds of rho from all together."""
 
     given_as = "logs"
     reasons: ClassVar[Mapping[str, str]] = {"run": "logs were given"}
@@ -121,23 +157,26 @@ class Logs(Runs):
     logs: tuple[SeenLog, ...]
     accelerated: tuple[Accelerated, ...]
     interval: RhoInterval
-    spectrum: Spectrum | None = None
 
     def spectra(self) -> tuple[Role, ...]:
-        """The roles of the runs, where they decide rho; an estimate beside a run that was not relaxed by a constant."""
-        if self.spectrum is not None:
-            return (estimated(self.spectrum, FACTORS),)
-        return tuple(replace(role, level="estimated" if self.accelerated else "known") for role in super().spectra())
+        """The same, an estimate beside a run that was not relaxed by a constant."""
+        return tuple(replace(role, level="estimated") if self.accelerated else role for role in super().spectra())
 
-    def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
-        """On the spectrum by Aitken's factors, with the roles exchanged too, or for the theta to paste."""
-        return super().methods(roles) if self.spectrum is None else self.on_estimates(self.spectrum, FACTORS)
+    @property
+    def least_rho(self) -> float | None:
+        """The bound of all logs together."""
+        return None if self.interval.lo is None else below(self.interval.lo.value)
+
+    @property
+    def shows(self) -> str:
+        """Aitken's factors, of a coupling whose eigenvalues are >= 0."""
+        return FACTORS if self.kind.signed else self.given_as
 
     @property
     def why_no_theta(self) -> str:
         if self.spectrum is None and self.friction_bounds is None and self.accelerated and not self.readings:
             return "the runs decide no theta: make the run that `next` names"
-        return "" if self.spectrum is not None else super().why_no_theta
+        return super().why_no_theta
 
 
 #: The logs of no run.
@@ -157,7 +196,7 @@ def decided(
     following: NextRun,
     rho: Fraction | None,
     *,
-    tied: bool,
+    kind: Kind,
     friction_bounds: FrictionBounds | None,
 ) -> dict[str, Any]:
     """The fields of :class:`Runs`: a theta to paste where the runs decide rho, else a run that was not made yet.
@@ -172,5 +211,5 @@ def decided(
         learns = not following.kept and friction_bounds is None
         if learns and not any(one.rises or one.theta >= LIKE_ONE for one in made):
             following = replace(following, why=f"{following.why}. {AT_ONE}")
-    left = tuple(one for one in readings if not (tied and one.kind in OF_OPEN_NODES))
+    left = tuple(one for one in readings if not (kind.linear and one.kind in OF_OPEN_NODES))
     return {"readings": left, "next": following, "rho": rho, "friction_bounds": friction_bounds}

@@ -34,13 +34,15 @@ RESIDUALS = {"assumed": "taken as absolute", "drop": "over the first or largest 
 def _of_run(run: OneRun, found: Advice) -> Iterator[Section]:
     yield _assumed(run)
     yield from of_a_run(run)
-    if found.roles:
+    if found.roles and run.kind.signed:
         yield from which_body_and_theta(found)
-        yield from which_method(found)
+    yield from which_method(found)
+    if found.roles:
         yield from paste_and_quote(found)
-    again = (
-        f"ndtheory advise run {'--tied ' * found.tied}{'--friction ' * run.rubs}--theta {{}} --ratio R (R: its ratio)"
-    )
+    made = (*run.earlier, (run.theta, run.ratio)) if not run.kind.signed else ()
+    before = "".join(f"--theta {float(theta):g} --ratio {float(ratio):g} " for theta, ratio in made)
+    options = f"{run.kind.typed}{'--friction ' * run.rubs}{before}"
+    again = AS_ABOVE if found.roles and made else f"ndtheory advise run {options}--theta {{}} --ratio R (R: its ratio)"
     yield _end(run, found, again)
 
 
@@ -50,8 +52,9 @@ def _of_logs(logs: Logs, found: Advice) -> Iterator[Section]:
     yield from of_logs(logs)
     if found.roles and any(row.bound for row in found.methods):
         yield paste(found, few_methods(found))
-    elif found.roles:
+    else:
         yield from which_method(found)
+    if found.roles and not any(row.bound for row in found.methods):
         yield paste(found)
     yield _end(
         logs, found, AS_ABOVE if found.roles else "a run with theta = {0}; then this again plus --log LOG --theta {0}"
@@ -61,12 +64,13 @@ def _of_logs(logs: Logs, found: Advice) -> Iterator[Section]:
 def _end(runs: Runs, found: Advice, again: str) -> Section:
     theta = f"{runs.next.theta:g}"
     then = f"no run; keep theta = {theta}" if runs.next.kept and not found.roles else again.format(theta)
-    return closing("a bound of rho with friction, or that a reading is the right one", then=then)
+    friction = "a bound of rho with friction, or " * runs.kind.signed
+    return closing(f"{friction}that a reading is the right one", then=then)
 
 
 def _assumed(runs: Runs) -> Section:
     """The assumption under which runs are read, before all else."""
-    free = not runs.kind.tied and not runs.rubs
+    free = not runs.kind.linear and not runs.rubs
     otherwise = " With friction add --friction." if free else ""
     return section("assumed", "", Note(f"Assumed: {runs.assumes}.{otherwise}", 0))
 

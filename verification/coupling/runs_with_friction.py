@@ -24,17 +24,8 @@ from typing import Any
 from ndtheory.keys import Part, key
 from ndtheory.number import above, below
 from verification.coupling.ends import DEAR, SWIFT
-from verification.coupling.readings import (
-    LARGEST_TO_PASTE,
-    SAME,
-    SHORTEST_STEP,
-    NextRun,
-    Observed,
-    RunReading,
-    few,
-    kept,
-    rounded_down,
-)
+from verification.coupling.kinds import LARGEST_TO_PASTE
+from verification.coupling.readings import SAME, SHORTEST_STEP, NextRun, Observed, RunReading, few, kept, rounded_down
 from verification.coupling.seen import SeenLog
 
 #: So many thetas between two runs are compared.

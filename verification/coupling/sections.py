@@ -13,9 +13,9 @@ from verification.coupling.advice import Advice
 from verification.coupling.cells import NARROW, Suggested
 from verification.coupling.evidence import Evidence
 from verification.coupling.from_problems import FromProblem
-from verification.coupling.kinds import BodyNumber
+from verification.coupling.kinds import LARGEST_TO_PASTE, BodyNumber
 from verification.coupling.methods import NAMES as METHOD_NAMES
-from verification.coupling.readings import LARGEST_TO_PASTE, NextRun
+from verification.coupling.readings import NextRun
 from verification.coupling.roles import Role, in_steps
 from verification.coupling.sides import Matrices
 from verification.coupling.snippets import SNIPPETS, CouplingScheme, precice_acceleration
@@ -41,6 +41,9 @@ def name_of(found: Advice, body: int | None) -> str:
     """Words for the Neumann body of a role."""
     return "as in that run" if body is None else found.evidence.words(body)
 
+
+#: Signs before a number of steps that is bounded.
+SIGNS = {None: "", "at most": "<= ", "at least": ">= "}
 
 #: The next step where nothing is left to type.
 AS_ABOVE = "your coupling, with the lines above"
@@ -90,7 +93,8 @@ def _of_vectors(evidence: Vectors, found: Advice) -> Iterator[Section]:
         yield from which_method(found)
         yield from paste_and_quote(found)
     if found.theta is None:
-        yield closing("a theta", then="ndtheory advise vectors X.npy TX.npy (with more iterates)")
+        again = f"ndtheory advise vectors {found.coupling.typed}X.npy TX.npy (with more iterates)"
+        yield closing("a theta", then=again)
     else:
         yield _end(found, AS_ABOVE)
 
@@ -108,8 +112,8 @@ def paste_and_quote(found: Advice) -> Sections:
 
 def _end(found: Advice, then: Next | str) -> Section:
     """The limits of the advice, and the command to type next."""
-    tied = "that nothing opens or slips"
-    claims = tied if found.tied else "that the predicted theta is the best one for other loads or meshes"
+    claims = "that nothing opens or slips" if found.coupling.signed else "that the coupling is linear"
+    claims = claims if found.tied else "that the predicted theta is the best one for other loads or meshes"
     return closing(claims, *map(outside_the_theorem, found.evidence.outside), then=then)
 
 
@@ -219,7 +223,7 @@ def which_method(found: Advice, names: Mapping[int | None, str] | None = None) -
         roles = "exchanged" if exchanged else "as they are"
         if named:
             roles = name_of(found, body) if names is None else names[body]
-        rows.append((roles, figures(own[0].theta), *(count(row.steps, "<= " * bool(row.bound)) for row in own)))
+        rows.append((roles, figures(own[0].theta), *(count(row.steps, SIGNS[row.bound]) for row in own)))
     first, *others = (METHOD_NAMES[row.method] for row in own)
     heads = ("Neumann" if named else "roles", "theta", f"steps to 1e-6: {first}", *others)
     said = []
@@ -228,6 +232,8 @@ def which_method(found: Advice, names: Mapping[int | None, str] | None = None) -
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
         if who:
             said.append(EXCHANGED)
+        if found.coupling.parallel:
+            said.append("Predicted for parallel coupling, in which an evaluation runs both solvers.")
         if not found.tied:
             said.append("Predicted as if tied: where contact changes, IQN-ILS may not arrive.")
         elif found.method.name != "constant":
@@ -237,7 +243,7 @@ def which_method(found: Advice, names: Mapping[int | None, str] | None = None) -
 
 def few_methods(found: Advice) -> str:
     """The same in one line, where only the largest eigenvalue is known."""
-    each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ' * bool(row.bound))}" for row in found.methods]
+    each = [f"{METHOD_NAMES[row.method]} {count(row.steps, SIGNS[row.bound])}" for row in found.methods]
     return f"Steps to 1e-6: {', '.join(each)} (for eigenvalues from 0 to the largest)."
 
 
@@ -255,6 +261,10 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     said.append(f"eigenvalues are {'; '.join(kinds)}")
     if seen.noise is not None:
         said.append(f"images of dependent directions differ by {figures(seen.noise, 2)} of the largest: noise")
+    if seen.apart is None:
+        said.append("not seen: noise and memory of the solvers, which one iterate evaluated twice in succession shows")
+    elif seen.apart:
+        said.append(f"two images of one iterate differ by {figures(seen.apart, 2)} of its residual: noise, or a memory")
     if not found.roles:
         said.append(f"No theta: {found.why_no_theta}.")
     yield section("given", "WHAT WAS GIVEN?", *said)
@@ -269,10 +279,13 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     else:
         theta, rate = found.chosen(found.best)
         formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
+        formula = "1/(1 + largest)" if found.coupling.parallel else formula
         notes = [
             "Ritz values: eigenvalues as these vectors show them, from inside; the errors are estimates.",
             f"theta = {theta:.4g} = {formula}, with both errors: factor {near_one(rate)} a step",
         ]
+    if spectrum.low < 0 and not found.coupling.signed:
+        notes.append("An eigenvalue between -1 and 0 is positive feedback; a theta above 1 is no mistake there.")
     rows = [
         ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
         ("largest lambda, rho", largest, error),
@@ -343,7 +356,9 @@ def paste(found: Advice, *more: str) -> Section:
         elif auto.source == "proved":
             takes = f'theta = "auto" takes the proved {float(auto.theta):.4g}'
             said.append(f"{takes}: at most twice the predicted steps.")
-    said.append("For displacements (heat: temperatures) the same, but not in parallel coupling.")
+    both = "Both fields are relaxed: the scheme is parallel, and names both as data of the acceleration."
+    one = "For displacements (heat: temperatures) the same, but not in parallel coupling."
+    said.append(both if found.coupling.parallel else one)
     return pasted_for(found, found.neumann_body, *said, *more)
 
 

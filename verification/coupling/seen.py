@@ -2,26 +2,46 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
 
 from ndtheory.keys import Part, key
 from ndtheory.keys import says as means
 from ndtheory.number import above, below
-from verification.coupling.log_files import Column
+from verification.coupling.log_files import Column, Log
 from verification.coupling.pace import MOST_WINDOWS, RELATIVE, Pace, pace, pooled, together
-from verification.coupling.readings import FEWEST_STEPS, Made, NextRun, Observed, RunReading, few, steps_needed
+from verification.coupling.readings import (
+    FEWEST_STEPS,
+    Made,
+    NextRun,
+    Observed,
+    RunReading,
+    few,
+    rho_in_parallel,
+    steps_needed,
+)
 
 #: A residual below this share of its largest value has fallen, although the log is too short for a ratio.
 FALLEN = 0.1
+
+#: So many steps of the second halves of all windows are enough to pool them.
+POOLED = 30
+
+#: Residuals at the end of a log by which the units of two fields are compared, and how far these may be apart.
+STRAIGHT, WIDE = 40, 4.0
 
 #: Numbers of one run, as rho by two fields, agree within this factor.
 AGREE = Fraction(103, 100)
 
 #: Assumption under which a ratio bounds rho from below, and from above.
 FROM_BELOW = "no friction, or a tied interface"
+FROM_FEW = f"{FROM_BELOW}, and ratios that have settled or still rise"
 TIED = "a tied interface"
 FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
 
@@ -43,6 +63,7 @@ _WORDS = {
     "plateau": "at a plateau",
     "unsteady": "without a steady ratio",
     "short": "with too few steps",
+    "growth": "growing over too few steps",
 }
 
 
@@ -63,7 +84,8 @@ class SeenColumn(Part):
     ratio: Observed | None = key(**_TOGETHER)
     plateau: Observed | None = key(**_TOGETHER)
     pooled: Observed | None = key(
-        "the ratio over the second halves of all windows, where none shows a ratio: it bounds nothing",
+        "the ratio over the second halves of all windows, where none shows a ratio: beyond 1 - theta it bounds rho "
+        "from below, else nothing",
         null="where windows are read one by one, or are fewer than five",
         why="windows are read one by one, or are too few or too short to be pooled",
         default=None,
@@ -73,7 +95,8 @@ class SeenColumn(Part):
     @means(
         "windows whose residual changes by a steady ratio at its end (`steady`), stays at a `level`, is relative and "
         "flat above 1 (`plateau`), ends at a level below 1e-3 of the largest, which the accuracy of the solvers may "
-        "set (`floor`), or from which nothing follows (`unsteady`, and `short` of too few steps); of more than 300 "
+        "set (`floor`), or from which nothing follows (`unsteady`, and `short` of too few steps), but of `growth` the "
+        "last ratio as a bound from below; of more than 300 "
         "windows the last ones are read, and only those of ten steps and more where there are any",
         type="map of integer",
         unit="1",
@@ -109,7 +132,7 @@ def seen_column(column: Column, theta: Fraction) -> SeenColumn:
     windows = ([window for window in column.windows if len(window) > FEWEST_STEPS] or column.windows)[-MOST_WINDOWS:]
     paces = tuple(pace(window, column, theta) for window in windows)
     short = all(one.kind in ("short", "unsteady") for one in paces)
-    relative, steps = column.residual in RELATIVE, steps_needed(theta)
+    relative, steps = column.residual in RELATIVE, min(steps_needed(theta), POOLED)
     return SeenColumn(
         name=column.name,
         residual=column.residual,
@@ -119,6 +142,33 @@ def seen_column(column: Column, theta: Fraction) -> SeenColumn:
         plateau=together([one for one in paces if one.kind == "plateau"]),
         pooled=pooled(windows, relative=relative, steps=steps) if short else None,
     )
+
+
+def of_both_fields(log: Log) -> Log:
+    """A log of *parallel* coupling with one series: modes turn, so that one field is small where the other is large.
+
+    The first field counts with a unit in which the logarithms of both together are as straight as they can be; of
+    several kinds of residuals absolute ones are taken.
+    """
+    columns = [column for column in log.columns if column.residual == "absolute"]
+    columns = columns if len(columns) > 1 else list(log.columns)
+    if len(columns) < 2 or [*map(len, columns[0].windows)] != [*map(len, columns[1].windows)]:
+        return log
+    one, other, *_ = columns
+    longest = max(range(len(one.windows)), key=lambda i: len(one.windows[i]))
+    g, u = (np.asarray(column.windows[longest]) ** 2 for column in (one, other))
+    counts = np.isfinite(g) & np.isfinite(u) & (g > 0) & (u > 0)
+    g, u = g[counts][-STRAIGHT:], u[counts][-STRAIGHT:]
+    if len(g) < FEWEST_STEPS:
+        return log
+    middle = float(np.log(u / g).mean())
+    bent = lambda shift: float((np.diff(np.log(g * math.exp(middle + shift) + u), 2) ** 2).sum())
+    found = minimize_scalar(bent, bounds=(-WIDE, WIDE), method="bounded", options={"xatol": 1e-6})
+    unit = math.exp(middle + float(found.x))
+    joined = tuple(np.sqrt(unit * a**2 + b**2) for a, b in zip(one.windows, other.windows, strict=True))
+    digits = max(column.digits + column.decimals for column in (one, other))
+    name = f"{one.name} and {other.name}"
+    return replace(log, columns=(replace(one, name=name, windows=joined, digits=digits, decimals=0.0),))
 
 
 def _same(one: Observed, other: Observed) -> bool:
@@ -193,6 +243,11 @@ class SeenLog(Part):
         if len(found) != 1 or self.plateau != found[0]:
             return None
         return 1 / (found[0].of_relaxed(self.theta).value - 1)
+
+    @property
+    def explodes(self) -> bool:
+        """True if a residual grows over too few steps for a ratio."""
+        return any(column.count("growth") for column in self.columns)
 
     @property
     def stays(self) -> bool:
@@ -273,14 +328,19 @@ class RhoInterval(Part):
     )
 
 
-def bounds(logs: Sequence[SeenLog]) -> tuple[list[LogBound], list[LogBound]]:
+def bounds(logs: Sequence[SeenLog], *, parallel: bool = False) -> tuple[list[LogBound], list[LogBound]]:
     """Every bound of rho from below and from above that a log gives."""
     lower, upper = [], []
+    rho = lambda r, theta: rho_in_parallel(theta, r) if parallel else (1 + r) / theta - 1
     for log in logs:
         ratio, plateau, theta = log.slowest, log.plateau, log.theta
         if ratio is not None and not {"mode-low", "open"} & {reading.kind for reading in log.readings}:
             says = f"its residual changes by {few(ratio.least)} a step or more, beyond 1 - theta"
-            lower.append(LogBound(value=(1 + ratio.least) / theta - 1, log=log, says=says, assumes=FROM_BELOW))
+            assumes = FROM_FEW if log.explodes else FROM_BELOW
+            lower.append(LogBound(value=rho(ratio.least, theta), log=log, says=says, assumes=assumes))
+        elif ratio is None and log.pooled is not None and log.readings:
+            says = f"at the end of its windows the residual changes by {few(log.pooled.value)} a step, beyond 1 - theta"
+            lower.append(LogBound(value=rho(log.pooled.value, theta), log=log, says=says, assumes=FROM_FEW))
         if log.diverges:
             lower.append(LogBound(value=2 / theta - 1, log=log, says="it does not converge", assumes=FROM_BELOW))
         if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):
@@ -288,5 +348,5 @@ def bounds(logs: Sequence[SeenLog]) -> tuple[list[LogBound], list[LogBound]]:
             lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=TIED))
         if ratio is not None and log.converges:
             says = f"its residual changes by {few(ratio.most)} a step at most"
-            upper.append(LogBound(value=(1 + ratio.most) / theta - 1, log=log, says=says, assumes=FROM_ABOVE))
+            upper.append(LogBound(value=rho(ratio.most, theta), log=log, says=says, assumes=FROM_ABOVE))
     return lower, upper

@@ -14,8 +14,8 @@ from ndtheory.keys import Part, key, says
 from ndtheory.moduli import Moduli
 from ndtheory.number import above
 from verification.coupling.evidence import Evidence
-from verification.coupling.kinds import BodyNumber
-from verification.coupling.readings import LARGEST_TO_PASTE, NextRun, or_at_one, rounded_down
+from verification.coupling.kinds import LARGEST_TO_PASTE, BodyNumber
+from verification.coupling.readings import NextRun, or_at_one, rounded_down
 from verification.coupling.roles import PROVED, Role
 from verification.problem.writing import written_number
 

@@ -1,7 +1,7 @@
 """Eigenvalues of a coupling: all of them, their ends, or estimates.
 
 While contact does not change, ``T x - T y = -H (x - y)`` with ``H`` similar to ``S_n^-1 S_c``.  Its eigenvalues lambda
-are real and at least 0 where both stiffnesses are symmetric; open nodes have lambda = 0.  A mode is multiplied by
+are real and at least 0 where both are symmetric stiffnesses; open nodes have lambda = 0.  A mode is multiplied by
 ``1 - theta (1 + lambda)`` in a step with constant theta.
 """
 
@@ -49,7 +49,7 @@ class Spectrum(Value):
 
     @classmethod
     def between(cls, low: float, high: float) -> Spectrum:
-        """Modes between two ends, ``0 <= low <= high``: the extrema of a Chebyshev polynomial, dense at both ends."""
+        """Modes between two ends, ``low <= high``: the extrema of a Chebyshev polynomial, dense at both ends."""
         x = np.cos(np.pi * np.arange(BETWEEN) / (BETWEEN - 1))[::-1]
         return cls(values=(low + (high - low) * (1 + x) / 2).astype(complex), source="ends")
 
@@ -92,6 +92,12 @@ class Spectrum(Value):
             values=np.concatenate([[0j], self.values]), source=self.source, error_low=0.0, error_high=self.error_high
         )
 
+    def parallel(self) -> Spectrum:
+        """The same for *parallel* coupling, an error added at the upper end: both square roots of minus each."""
+        roots = np.sqrt(-np.append(self.values, self.values[-1] + self.error_high))
+        found = np.concatenate([roots, -roots])
+        return Spectrum(values=found[np.argsort(found.real)], source=self.source)
+
     def factor(self, theta: float) -> float:
         """``max |1 - theta (1 + lambda)|``, the factor of a step with constant theta for the worst mode."""
         return float(np.abs(1 - theta * (1 + self.values)).max())
@@ -99,8 +105,9 @@ class Spectrum(Value):
     @property
     def theta(self) -> float:
         """The theta of least factor, the ends as far apart as their errors allow; ``2/(2+low+high)`` if it is real."""
-        low, high = max(self.low - self.error_low, min(self.low, 0.0)), self.high + self.error_high
+        low, high = self.low - self.error_low, self.high + self.error_high
         if self.real:
-            return 2 / (2 + low + high)
-        most = 2 / (1 + max(high, 0.0))
+            return 2 / (2 + (max(low, 0.0) if self.low >= 0 else low) + high)
+        z = 1 + self.values
+        most = float((2 * z.real / np.abs(z) ** 2).min())  # from there on a mode grows
         return float(minimize_scalar(self.factor, bounds=(0, most), method="bounded", options={"xatol": 1e-9}).x)

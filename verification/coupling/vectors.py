@@ -14,9 +14,9 @@ from fem1d2d.mesh import Floats
 from ndtheory import Number
 from ndtheory.keys import key, says
 from verification.coupling.evidence import Evidence
-from verification.coupling.kinds import kind_of
+from verification.coupling.kinds import CONTACT, Kind
 from verification.coupling.methods import MethodRow
-from verification.coupling.roles import PROVED, Role, estimated, unnumbered
+from verification.coupling.roles import PROVED, Role, unnumbered
 from verification.coupling.spectrum import MARGIN, REAL, Complex, Spectrum
 from verification.value import Value
 
@@ -42,6 +42,9 @@ SETTLED, MORE = 0.02, 3
 #: smooth data hide the stiff modes it changed by 0.06 or more as long as theta diverged.
 STEADY, FEWER, LEFT = 0.05, 2, 1
 
+#: Two images of one iterate that are further apart, over its residual, leave no eigenvalue.
+LOUD = 0.1
+
 #: Residuals below this share of the value show a space that the coupling maps to itself.
 INVARIANT = 1e-6
 
@@ -54,6 +57,12 @@ OPEN = 1e-12
 #: The meaning of images that equal their iterates, and of those that one vector moves away from them.
 SOLVED = "each is a solution already, or X was given for TX; needed iterates from before the run has converged"
 SHIFTED = "all eigenvalues are -1, with which no theta above 0 converges; one solver probably has the wrong sign"
+
+#: The reason for negative eigenvalues where a kind of coupling has none.
+WRONG_SIGN = (
+    "one solver probably has the wrong sign (the second solver must return the force that acts on the first body), or "
+    "the coupling has positive feedback (kind general)"
+)
 
 _COUNTS = "length of a vector, number of iterates, of those that were read, and of their independent differences"
 
@@ -95,10 +104,17 @@ class Vectors(Evidence, Value):
     changing: bool = key("whether nodes open or close between the iterates", name="contact_changes")
     settled: bool = key("false if they still do in the last four: then no theta follows")
     noise: float | None = key(
-        "share by which images of dependent directions differ",
+        "share by which images of dependent directions, or of one iterate given twice, differ: no error is less",
         unit="1",
-        null="where all directions are independent",
-        why="the directions of the iterates are independent",
+        null="where all directions are independent and no iterate was given twice",
+        why="the directions of the iterates are independent, and no iterate was given twice",
+    )
+    apart: float | None = key(
+        "of an iterate that was given twice in succession how far its images are apart, over the largest residual so "
+        "far: the noise of the solvers, or their memory",
+        unit="1",
+        null="where none was",
+        why="no iterate was given twice in succession",
     )
     low_found: bool = key("false while 1 + 1/lambda of the least eigenvalue changes with every iterate")
     high_found: bool = key("false while the largest eigenvalue does: then no theta follows")
@@ -106,19 +122,24 @@ class Vectors(Evidence, Value):
 
     @cached_property
     def seen(self) -> Spectrum:
-        """The spectrum, with a mode for open nodes unless the coupling is tied."""
-        return self.spectrum if self.kind.tied else self.spectrum.with_open_nodes()
+        """The spectrum, with a mode for open nodes unless nothing opens."""
+        return self.spectrum if self.linear else self.spectrum.with_open_nodes()
+
+    @property
+    def linear(self) -> bool:
+        """True if nothing opens or slips, or is not seen to."""
+        return self.kind.linear or not (self.changing or self.negative or not self.settled)
 
     def spectra(self) -> tuple[Role, ...]:
         """The roles of the run; rho is only bounded while the largest eigenvalue is not found."""
-        if self.negative or not self.settled:
+        if self.negative or not self.settled or (self.apart or 0.0) > LOUD:
             return ()
         if self.high_found:
-            return (estimated(self.seen, "vectors"),)
+            return (self.estimated(self.seen, "vectors"),)
         why = self.why_no_theta
         names = ("theta_predicted", "rate_predicted", *PROVED, "friction_threshold", "rho_min")
         reason = unnumbered("vectors") | dict.fromkeys(names, why)
-        rho = Number.of_float(max(self.seen.high, 0.0))
+        rho = Number.of_float(max(self.seen.high, self.kind.least))
         return (Role(neumann_body=None, rho=rho, spectrum=self.seen, reason=reason, level="bounded"),)
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
@@ -131,7 +152,7 @@ class Vectors(Evidence, Value):
             return self.on_estimates(self.seen, "vectors") if roles else ()
         if not self.low_found or self.seen.low - self.seen.error_low <= 0:
             return ()
-        role = estimated(self.seen.exchanged().with_open_nodes(), "vectors")
+        role = self.estimated(self.seen.exchanged().with_open_nodes(), "vectors")
         return self.in_role(role, tied=True, exchanged=True)
 
     @property
@@ -139,6 +160,9 @@ class Vectors(Evidence, Value):
         """Why no theta follows."""
         if self.negative:
             return self.negative
+        if (self.apart or 0.0) > LOUD:
+            share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
+            return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
         if not self.settled:
             return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.high_found:
@@ -151,26 +175,30 @@ class Vectors(Evidence, Value):
     @property
     def negative(self) -> str:
         """Why eigenvalues below 0 leave no theta; empty where there are none of these."""
-        if self.ritz.real.max() < -REAL:
-            needed = "the second solver must return the force that acts on the first body"
-            return f"all eigenvalues are negative: one solver probably has the wrong sign ({needed})"
+        if (self.apart or 0.0) > LOUD:
+            return ""
+        if self.kind.signed and self.ritz.real.max() < -REAL:
+            return f"all eigenvalues are negative: {WRONG_SIGN}"
         if self.ritz.real.min() <= RANK - 1:
             return f"an eigenvalue is {self.ritz.real.min():.3g}: with -1 or less no theta above 0 converges"
         return ""
 
 
-def seen_in(X: Floats, TX: Floats, *, tied: bool = False, starts: NDArray[np.bool_] | None = None) -> Vectors:
+def seen_in(X: Floats, TX: Floats, *, kind: Kind = CONTACT, starts: NDArray[np.bool_] | None = None) -> Vectors:
     """The spectrum by Ritz values: iterates x and their images T x as rows, of a run by any method.
 
     With an orthonormal basis U of the differences of the iterates, the eigenvalues of ``U' (1 + H) U`` lie between the
     ends of ``1 + H`` in the inner product in which H is selfadjoint, and nearly so in the Euclidean one.
 
+    A vector of *parallel* coupling has two fields of one length, one behind the other, of which each image depends on
+    the other one.  Each has its basis, so that no unit counts, and H is minus the product of both maps.
+
     Parameters
     ----------
     X, TX : array, shape (k, n)
         k >= 2 vectors and what T makes of them.
-    tied : bool
-        True if an entry that is 0 shows no open node.
+    kind : Kind
+        Of contact an image that is 0 shows an open node.
     starts : array of bool, shape (k,), optional
         Where another step in time begins, with another T of the same linear part.
 
@@ -179,47 +207,49 @@ def seen_in(X: Floats, TX: Floats, *, tied: bool = False, starts: NDArray[np.boo
     ValueError
         The iterates, or their residuals, do not differ above rounding.
     """
-    given, last = len(X), len(X) if tied else _last_piece(TX)
+    given, last = len(X), len(X) if kind.linear else _last_piece(TX)
     changing, read = last < given, last if last >= FEWEST else given
     X, TX = X[-read:], TX[-read:]
     inside = np.ones(read - 1, dtype=bool) if starts is None else ~starts[-read + 1 :]
-    values, residuals, noise = _ritz(X, TX, inside)
-    low, high = (_error(values, residuals, i) for i in (0, -1))
-    negative = bool(values[0].real < 1 - max(REAL, low))
+    unknowns = X.shape[1] // (1 + kind.parallel)
+    values, residuals, noise = _ritz(X, TX, inside, kind)
+    unsure = (noise or 0.0) * float(np.abs(values).max())
+    low, high = (max(_error(values, residuals, i), unsure) for i in (0, -1))
+    negative = kind.signed and bool(values[0].real < 1 - max(REAL, low))
     sizes = np.abs(values)
-    modes = _modes(values, residuals / np.maximum(sizes, RANK * sizes.max()), X.shape[1])
+    modes = _modes(values, residuals / np.maximum(sizes, RANK * sizes.max()), unknowns)
     spectrum = Spectrum(values=modes - 1, source="vectors", error_low=low, error_high=high)
-    before = _before(X, TX, inside, len(values))
+    before = _before(X, TX, inside, len(values), kind)
     steady = lambda ends: len(before) > 0 and max(ends) <= (1 + STEADY) * min(ends)
-    whole = len(values) == X.shape[1]
+    whole = len(values) == unknowns
     known = [whole or bool(residuals[i] <= INVARIANT * abs(values[i])) for i in (0, -1)]
     tops = [float(found[-1].real) for found in (*before, values)]
     least = [float(found[0].real) - 1 for found in (*before, values)]
-    found = Vectors(
-        unknowns=X.shape[1],
+    return Vectors(
+        kind=kind,
+        unknowns=unknowns,
         iterates=given,
         used=read,
         directions=len(values),
         spectrum=spectrum,
         symmetric=spectrum.real,
-        changing=changing or negative,
+        changing=changing or (negative and not kind.linear),
         settled=not changing or last >= FEWEST,
         ritz=values - 1,
         noise=noise,
-        low_found=min(least) > 0 and (known[0] or steady([1 + 1 / low for low in least])),
+        apart=_apart(X, TX, inside),
+        low_found=min(least) > 0 and (known[0] or steady([1 + 1 / one for one in least])),
         high_found=known[1] or steady(tops),
         course=tuple(top - 1 for top in tops),
     )
-    linear = (tied or not found.changing) and found.settled and not found.negative
-    return replace(found, kind=kind_of(tied=linear))
 
 
-def _before(X: Floats, TX: Floats, inside: NDArray[np.bool_], directions: int) -> list[Complex]:
+def _before(X: Floats, TX: Floats, inside: NDArray[np.bool_], directions: int, kind: Kind) -> list[Complex]:
     """Ritz values of fewer iterates, up to FEWER directions fewer; empty where fewer than LEFT would be left."""
     found: list[Complex] = []
     for count in range(len(X) - 1, LEFT, -1):
         try:
-            values = _ritz(X[:count], TX[:count], inside[: count - 1])[0]
+            values = _ritz(X[:count], TX[:count], inside[: count - 1], kind)[0]
         except ValueError:
             return []
         if len(values) < directions and all(len(values) < len(more) for more in found):
@@ -229,40 +259,79 @@ def _before(X: Floats, TX: Floats, inside: NDArray[np.bool_], directions: int) -
     return []
 
 
-def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> tuple[Complex, Floats, float | None]:
+def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_], kind: Kind) -> tuple[Complex, Floats, float | None]:
     """Ritz values of ``1 + H`` by increasing real part, their residuals, and the noise of the images.
 
     Differences of consecutive rows count where ``inside``.
     """
-    largest = float(np.abs(TX).max())
-    unit = math.ldexp(1.0, math.frexp(max(largest, float(np.abs(X).max())))[1])  # a power of 2: no digit changes
-    D, E = (np.diff(rows, axis=0)[inside].T / unit for rows in (X, TX - X))
-    lengths = np.linalg.norm(D, axis=0)
-    accuracy = _accuracy(X, TX) * largest / unit
-    kept = lengths > ROUNDING * accuracy
-    if not kept.any():
-        raise ValueError("the iterates do not differ above rounding: needed two different ones")
-    D, E = D[:, kept] / lengths[kept], E[:, kept] / lengths[kept]
-    if (np.linalg.norm(E, axis=0) <= accuracy / lengths[kept]).all():
-        if np.abs(TX - X).max() <= accuracy * unit:
-            raise ValueError(f"T x = x for every iterate, up to rounding: {SOLVED}")
-        raise ValueError(f"T x - x is the same for every iterate, up to rounding: {SHIFTED}")
-    U, sigma, Vt = np.linalg.svd(D, full_matrices=False)
-    images = -E @ Vt.T
-    sizes = np.linalg.norm(images, axis=0)
-    rest = sigma <= RANK * sigma[0]
-    largest = float((sizes[~rest] / sigma[~rest]).max())
-    noise = float(sizes[rest].max()) / largest if rest.any() else None
-    rounding = np.sqrt(((Vt * (accuracy / lengths[kept])) ** 2).sum(axis=1)) / largest
-    used = ~rest & (sigma * CLEAN >= np.maximum(rounding, noise or 0.0))
-    if not used.any():
-        used = sigma == sigma[0]
-    U, A = U[:, used], images[:, used] / sigma[used]
+    accuracy, half = _accuracy(X, TX), X.shape[1] // 2
+    if kind.parallel:
+        parts = slice(half), slice(half, None)
+        one, other = (Field.of(X[:, of], TX[:, of], accuracy) for of in parts)
+        images = [replace(field, rows=TX[:, of]) for field, of in zip((one, other), parts, strict=True)]
+        U, there, noise = _images(one, images[1], inside)
+        V, back, more = _images(other, images[0], inside)
+        A, noise = U - back @ (V.T @ there), max((each for each in (noise, more) if each is not None), default=None)
+    else:
+        field = Field.of(X, TX, accuracy)
+        fixed = bool(np.abs(TX - X).max() <= field.accuracy * field.unit)
+        same = "T x" if fixed else "T x - x"
+        still = f"{same} {'= x' if fixed else 'is the same'} for every iterate, up to rounding: "
+        still += SOLVED if fixed else SHIFTED
+        U, A, noise = _images(field, replace(field, rows=X - TX), inside, still)
     values, vectors = np.linalg.eig(U.T @ A)
     order = np.argsort(values.real)
     values, vectors = values[order], vectors[:, order]
     residuals = np.linalg.norm(A @ vectors - (U @ vectors) * values, axis=0)
     return values, residuals, noise
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Field:
+    """Vectors as rows, a power of 2 as their unit, so that no digit changes, and their accuracy in it."""
+
+    rows: Floats
+    unit: float
+    accuracy: float
+
+    @classmethod
+    def of(cls, rows: Floats, images: Floats, accuracy: float) -> Field:
+        """Iterates of one field beside its images, whose largest entry has this relative accuracy."""
+        largest = float(np.abs(images).max())
+        unit = math.ldexp(1.0, math.frexp(max(largest, float(np.abs(rows).max())))[1])
+        return cls(rows=rows, unit=unit, accuracy=accuracy * largest / unit)
+
+
+def _images(
+    given: Field, taken: Field, inside: NDArray[np.bool_], still: str = ""
+) -> tuple[Floats, Floats, float | None]:
+    """An orthonormal basis of the differences of some rows, what a linear map to others makes of it, and its noise.
+
+    Where the others do not differ ``still`` says what that means; empty where it is no error.
+    """
+    D, E = (np.diff(field.rows, axis=0)[inside].T / field.unit for field in (given, taken))
+    lengths = np.linalg.norm(D, axis=0)
+    kept, again = lengths > ROUNDING * given.accuracy, lengths == 0
+    if not kept.any():
+        raise ValueError("the iterates do not differ above rounding: needed two different ones")
+    loud = float(np.linalg.norm(E[:, again], axis=0).max(initial=0.0))
+    D, E = D[:, kept] / lengths[kept], E[:, kept] / lengths[kept]
+    if still and (np.linalg.norm(E, axis=0) <= taken.accuracy / lengths[kept]).all():
+        raise ValueError(still)
+    U, sigma, Vt = np.linalg.svd(D, full_matrices=False)
+    images = E @ Vt.T
+    sizes = np.linalg.norm(images, axis=0)
+    rest = sigma <= RANK * sigma[0]
+    largest = float((sizes[~rest] / sigma[~rest]).max()) or 1.0
+    noise = float(sizes[rest].max()) / largest if rest.any() else None
+    rounding = np.sqrt(((Vt * (max(taken.accuracy, loud) / lengths[kept])) ** 2).sum(axis=1)) / largest
+    used = ~rest & (sigma * CLEAN >= np.maximum(rounding, noise or 0.0))
+    if not used.any():
+        used = sigma == sigma[0]
+    if again.any():
+        felt = np.sqrt(((Vt * (loud / lengths[kept])) ** 2).sum(axis=1)) / sigma / largest
+        noise = max(noise or 0.0, float(felt[used].max()))
+    return U[:, used], images[:, used] / sigma[used], noise
 
 
 def _accuracy(X: Floats, TX: Floats) -> float:
@@ -277,6 +346,14 @@ def _accuracy(X: Floats, TX: Floats) -> float:
         if all(float(f"{value:.{digits - 1}e}") == value for value in some):
             return float(10.0 ** (1 - digits))
     return DOUBLE
+
+
+def _apart(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> float | None:
+    """The largest distance of two images of one iterate, over the largest residual up to it; None without any."""
+    same = np.flatnonzero(inside & (X[1:] == X[:-1]).all(axis=1))
+    residuals = np.maximum.accumulate(np.linalg.norm(TX - X, axis=1))
+    shares = [float(np.linalg.norm(TX[i + 1] - TX[i]) / (residuals[i] or 1.0)) for i in same]
+    return max(shares, default=None)
 
 
 def _last_piece(TX: Floats) -> int:

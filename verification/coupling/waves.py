@@ -10,12 +10,11 @@ from typing import Any, ClassVar
 
 from ndtheory import HypothesisError, Number
 from ndtheory.constants import take
-from ndtheory.energy_norms import tied_theta
 from ndtheory.keys import key, says
-from ndtheory.moduli import Wall, added_mass, conduction
+from ndtheory.moduli import Wall, added_mass, conduction, cooled
 from verification.coupling import methods
 from verification.coupling.evidence import Evidence
-from verification.coupling.kinds import BodyNumber, kind_of
+from verification.coupling.kinds import BodyNumber, Kind
 from verification.coupling.methods import MethodRow
 from verification.coupling.readings import NextRun
 from verification.coupling.roles import Role, plain_role
@@ -34,6 +33,10 @@ ONE_WAVE = "one wave bounds rho from below"
 
 #: Reason against the fluid as the Neumann body.
 SHORT_WAVES = "short waves have less and less added mass, so that rho would grow without end as meshes are refined"
+
+
+#: The same against a fluid with a film coefficient.
+SHORT_WAVES_OF_HEAT = "short waves meet more and more conductance of the wall: rho would grow as meshes are refined"
 
 
 def _data(meaning: str, null: str = "where not given") -> Any:
@@ -63,6 +66,7 @@ class Waves(Evidence):
     def exchanged(self) -> str:
         return self.subject
 
+    film: tuple[Fraction, ...] | None = _data("film coefficient of a fluid (body 1) at a wall (body 2)")
     conductivity: tuple[Fraction, ...] | None = _data("of plate 1 and of plate 2, the capacity per volume")
     capacity: tuple[Fraction, ...] | None = _data("of plate 1 and of plate 2, the capacity per volume")
     density: tuple[Fraction, ...] | None = _data("of the fluid (body 1) and of the wall (body 2)", "for heat")
@@ -83,7 +87,7 @@ class Waves(Evidence):
 
 
 #: The parameters, in the order in which they are shown.
-PARAMETERS = ("conductivity", "capacity", "density", "length", "dt", "thickness", "young", "poisson")
+PARAMETERS = ("film", "conductivity", "capacity", "density", "length", "dt", "thickness", "young", "poisson")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +98,7 @@ class Heat(Waves):
     counts: ClassVar[Mapping[str, tuple[int, ...]]] = {"conductivity": (2,), "capacity": (2,), "thickness": (2,)} | {
         "dt": (1,)
     }
-    needed = ("dt", "capacity"), ("capacity thickness", "dt")
+    needed: ClassVar[tuple[tuple[str, str], ...]] = (("dt", "capacity"), ("capacity thickness", "dt"))
     reasons: ClassVar[Mapping[str, str]] = {"quote": "no stiffness was given"}
 
     def spectra(self) -> tuple[Role, ...]:
@@ -115,6 +119,32 @@ class Heat(Waves):
         """The plate with the smaller product of both ends, which has the smaller rate, too."""
         product = lambda role: role.rho_min.value * role.rho_tied.value
         return min(roles, key=product).neumann_body
+
+
+@dataclass(frozen=True, kw_only=True)
+class Film(Heat):
+    """A fluid that takes heat from a wall, body 2, by a film coefficient: the same for all waves of the wall."""
+
+    first = "film"
+    counts: ClassVar[Mapping[str, tuple[int, ...]]] = dict.fromkeys(
+        ("film", "conductivity", "capacity", "thickness", "dt"), (1,)
+    )
+    needed = ("", "conductivity"), ("dt", "capacity"), ("capacity", "dt")
+
+    def spectra(self) -> tuple[Role, ...]:
+        """The wall as the Neumann body, and the fluid, which is refused."""
+        film, conductivity = self.given["film"][0], self.given["conductivity"][0]
+        capacity, thickness = self.one("capacity"), self.one("thickness")
+        if capacity is None and thickness is None:
+            raise HypothesisError("thickness", "nothing", "thickness beside film, or capacity and dt of a thick wall")
+        high = cooled(film, conductivity, capacity=capacity, thickness=thickness, dt=self.one("dt"))
+        ends: dict[str, Any] = {"rho_min": Number.of_float(0.0), "rho_tied": Number.of_float(high)}
+        known = {"spectrum": Spectrum.between(0.0, high), "no_threshold": "heat has no friction"}
+        return plain_role(2, Fraction(high), **ends, **known), Role.unknown(1, SHORT_WAVES_OF_HEAT)
+
+    def prefers(self, roles: Sequence[Role]) -> BodyNumber:
+        """The wall."""
+        return 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,10 +183,8 @@ class Fluid(Waves):
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
         """On the waves, for the best theta of these."""
-        if self.kind.parallel:
-            return ()
-        theta = float(tied_theta(min(self.values), max(self.values)))
-        return methods.rows(Spectrum.of(self.values), theta=theta, neumann_body=2, exchanged=False)
+        spectrum = Spectrum.of(self.values).parallel() if self.kind.parallel else Spectrum.of(self.values)
+        return methods.rows(spectrum, theta=spectrum.theta, neumann_body=2, exchanged=False)
 
     def next_run(self) -> NextRun:
         """A run to begin with."""
@@ -187,10 +215,13 @@ def read_waves(source: type[Waves], given: dict[str, Any], *, parallel: bool) ->
         if name not in source.counts:
             raise HypothesisError(name, shown(value), f"no {name} beside {source.first}")
     known: dict[str, Any] = {name: _numbers(name, value, source.counts[name]) for name, value in given.items()}
-    for beside, name in source.needed:
-        if name not in given and given.keys() >= {*beside.split()}:
-            raise HypothesisError(name, "nothing", f"{name} beside {beside.replace(' ', ' and ') or source.first}")
-    return source(kind=kind_of(tied=True, parallel=parallel), **known)
+    lacks = [
+        (beside, name) for beside, name in source.needed if name not in given and given.keys() >= {*beside.split()}
+    ]
+    for beside, name in lacks:
+        all_of = " and ".join(other for also, other in lacks if also == beside)
+        raise HypothesisError(name, "nothing", f"{all_of} beside {beside.replace(' ', ' and ') or source.first}")
+    return source(kind=Kind(name="tied", parallel=parallel), **known)
 
 
 def shown(value: Any) -> Any:

@@ -13,6 +13,7 @@ import verification as vf
 from ndtheory import HypothesisError
 from verification.coupling import from_logs
 from verification.coupling.ends import SWIFT, Box
+from verification.coupling.kinds import CONTACT, TIED, kind_of
 from verification.coupling.log_files import Column, Log
 from verification.coupling.pace import Pace
 from verification.coupling.readings import NextRun, Observed, read_observed, read_plateau
@@ -47,7 +48,7 @@ def bound(value, file="a.log", theta="0.5"):
 
 def together(*logs, tied=False, interval=None):
     found = interval or from_logs.interval_of(*from_logs.bounds(logs))
-    return from_logs.decide(logs, found, tied)
+    return from_logs.decide(logs, found, kind_of(tied=tied))
 
 
 def logged(folder, windows, theta, name="ResAbs(M:F)"):
@@ -271,7 +272,7 @@ def test_after_several_runs_of_which_none_converges_a_quarter_comes_next():
 
 def test_boxes_of_a_log_are_those_of_what_it_shows():
     holds = lambda seen, a, b, tied: any(
-        box.a[0] <= a <= box.a[1] and box.b[0] <= b <= box.b[1] for box in from_logs.boxes_of(seen, tied)
+        box.a[0] <= a <= box.a[1] and box.b[0] <= b <= box.b[1] for box in from_logs.boxes_of(seen, kind_of(tied=tied))
     )
     falls = log("0.4", "0.8")  # 1 - 0.4 * 0.5, or 0.4 * 4.5 - 1
     assert holds(falls, 1.0, 4.5, False)
@@ -295,37 +296,37 @@ def test_boxes_of_a_log_are_those_of_what_it_shows():
 
 def test_what_logs_leave_together_decides_within_1_4_and_else_names_a_run_below_those_that_rise():
     one, other = log("0.2", "0.8"), log("0.45", "0.8")  # 1 and 4
-    readings, following, rho = from_logs.by_ends((one, other), other, F(2), True)
+    readings, following, rho = from_logs.by_ends((one, other), other, F(2), TIED)
     assert readings[0].lo == 2.0
     assert float(rho) == pytest.approx(3, rel=0.05)
     assert float(rho) >= 3
     assert readings[0].value == float(rho)
     assert following.theta == pytest.approx(0.4, rel=0.05)
-    assert from_logs.by_ends((one, other), other, None, True)[0][0].lo is None
+    assert from_logs.by_ends((one, other), other, None, TIED)[0][0].lo is None
     base = log("0.38", "0.62")
-    _, in_contact, rho = from_logs.by_ends((one, other, base), base, None, False)
+    _, in_contact, rho = from_logs.by_ends((one, other, base), base, None, CONTACT)
     assert rho is not None
     assert in_contact.theta <= 0.38  # not above the base, which falls
-    assert from_logs.by_ends((one, other, base), base, None, True)[1].theta > 0.38
+    assert from_logs.by_ends((one, other, base), base, None, TIED)[1].theta > 0.38
     wide = log("0.1", observed("0.9"))
-    _, following, rho = from_logs.by_ends((wide,), wide, None, False)
+    _, following, rho = from_logs.by_ends((wide,), wide, None, CONTACT)
     assert rho is None
     assert "within 1.4 times" in following.why
-    _, below, _ = from_logs.by_ends((wide, log("0.2", "1.5"), log("0.3", "1.9")), wide, None, False)
+    _, below, _ = from_logs.by_ends((wide, log("0.2", "1.5"), log("0.3", "1.9")), wide, None, CONTACT)
     assert 0.1 < below.theta < 0.2 < following.theta
     only = log("0.5", "1.5", file="no falls")
-    assert from_logs.by_ends((only,), only, None, False) is None
+    assert from_logs.by_ends((only,), only, None, CONTACT) is None
     apart = (log("0.3", "0.95"), log("0.5", "0.2"))
-    readings, following, rho = from_logs.by_ends(apart, apart[1], None, True)
+    readings, following, rho = from_logs.by_ends(apart, apart[1], None, TIED)
     assert (following.theta, rho) == (0.15, None)
-    assert from_logs.by_ends(apart, apart[1], None, False) is None
+    assert from_logs.by_ends(apart, apart[1], None, CONTACT) is None
 
 
 def test_rho_is_taken_at_the_upper_end_of_all_that_is_left(monkeypatch):
     left = [Box(a=(1.0, 1.0), b=(1.3, 1.4)), Box(a=(1.0, 1.0), b=(1.1, 1.2))]
     monkeypatch.setattr("verification.coupling.ends.common", lambda each: left)
     falls = log("0.9", "0.2")
-    assert float(from_logs.by_ends((falls,), falls, None, True)[2]) == pytest.approx(0.4)
+    assert float(from_logs.by_ends((falls,), falls, None, TIED)[2]) == pytest.approx(0.4)
 
 
 def test_the_ends_of_the_spectrum_in_words():

@@ -259,8 +259,8 @@ def test_a_mode_of_open_nodes_is_exact_and_is_added_once():
     assert more.with_open_nodes() is more
 
 
-@pytest.mark.parametrize(("low", "least"), [(0.5, 0.3), (0.1, 0.0), (-0.3, -0.3)])
-def test_theta_has_room_for_the_errors_of_both_ends_but_none_below_0(low, least):
+@pytest.mark.parametrize(("low", "least"), [(0.5, 0.3), (0.1, 0.0), (-0.3, -0.5)])
+def test_theta_has_room_for_the_errors_of_both_ends_but_an_end_above_0_stays_there(low, least):
     assert estimated(low, 4.0, 0.2, 0.4).theta == pytest.approx(2 / (2 + least + 4.4))
 
 

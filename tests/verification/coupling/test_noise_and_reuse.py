@@ -1,0 +1,113 @@
+"""Solvers with noise or a memory, seen by one iterate evaluated twice; changes of earlier steps in time used again."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from linear_couplings import Linear
+
+import verification as vf
+from verification.algorithm.relaxation import FILTER, filtered
+from verification.coupling.vectors import LOUD
+
+VALUES = np.geomspace(0.1, 6, 12)
+
+
+def twice(T, **settings):
+    """A coupling of T whose start is evaluated twice."""
+    given = {"start": np.zeros(12), "kind": "tied", "rule": "aitken", "theta": 0.2, "max_iterations": 12}
+    return vf.couple(lambda g: g, T, twice=True, **given | settings)
+
+
+@pytest.mark.parametrize("noise", [1e-7, 1e-5, 1e-3])
+def test_no_error_is_called_smaller_than_the_noise_of_the_solvers(noise):
+    """The error of the largest eigenvalue is at least half of its true one, and the noise is found within a decade."""
+    random = np.random.default_rng(1)
+    found = twice(lambda u: 1 - VALUES * (u - 1) + noise * random.normal(size=12))
+    seen = found.advice.vectors
+    assert noise / 10 < seen.apart < 10 * noise
+    assert seen.noise > seen.apart
+    assert seen.error_high >= abs(seen.spectrum.high - 6) / 2
+    assert seen.error_high > noise
+    exact = twice(lambda u: 1 - VALUES * (u - 1)).advice.vectors
+    assert (exact.apart, exact.noise) == (0.0, 0.0)
+    assert found.iterations == twice(lambda u: 1 - VALUES * (u - 1)).iterations == 13
+
+
+def test_a_solver_with_a_memory_is_told_and_gets_no_theta():
+    state = np.zeros(12)
+
+    def remembers(u):
+        nonlocal state
+        state = state / 2 + (1 - VALUES * (u - 1)) / 2
+        return state
+
+    advice = twice(remembers).advice
+    assert advice.vectors.apart > LOUD
+    assert (advice.theta, advice.roles) == (None, ())
+    assert "a memory, so that T is no map of x" in advice.why_no_theta
+    assert "no theta above 0" not in advice.why_no_theta
+
+
+def test_vectors_without_a_pair_ask_for_one():
+    X, TX = Linear([0.5, 2.0]).run("aitken", 0.3, 5)
+    one = vf.advise_vectors(X, TX)
+    assert one.vectors.apart is None
+    with_pair = vf.advise_vectors(np.vstack([X[:1], X]), np.vstack([TX[:1], TX]))
+    assert with_pair.vectors.apart == 0
+    assert with_pair.theta == one.theta
+    words = lambda found: " ".join(str(part) for section in found.sections() for part in section.parts)
+    assert "one iterate evaluated twice" in words(one)
+    assert "one iterate evaluated twice" not in words(with_pair)
+
+
+# --- steps in time ---------------------------------------------------------------------------------------------------
+
+
+def through(coupling, most=12):
+    """Evaluations in each step in time of a tube whose load goes along it."""
+    q = 122 * np.sin(np.arange(1, 61) * np.pi / 122)
+    values, at = 9000 / q**2 / (1 + 1e-3 * q**2), np.arange(60) * 0.05
+    V = np.sqrt(2 / 61) * np.sin(np.outer(np.arange(1, 61), np.arange(1, 61)) * np.pi / 61)
+    g, counts = np.zeros(60), list[int]()
+    for time in range(most):
+        coupling.new_step()
+        counts.append(0)
+        while counts[-1] < 100:
+            counts[-1] += 1
+            Tg = np.sin(at * time) + 0.1 * time - V @ (values * (V @ g))
+            following = coupling.next(g, Tg)
+            if coupling.arrived:
+                break
+            g = following
+    return counts
+
+
+def test_changes_of_earlier_steps_save_more_than_half_of_the_evaluations():
+    settings = {"rule": "iqn-ils", "theta": 0.01, "kind": "tied"}
+    plain, again = (through(vf.Coupling(reuse=reuse, **settings)) for reuse in (0, 8))
+    assert again[:2] == plain[:2]
+    assert sum(again) < sum(plain) / 2
+
+
+def test_a_copy_in_the_midst_of_steps_goes_on_like_the_original():
+    coupling = vf.Coupling(rule="iqn-ils", theta=0.01, kind="tied", reuse=3)
+    through(coupling, 3)
+    others = copy.deepcopy(coupling), pickle.loads(pickle.dumps(coupling))
+    assert through(coupling, 2) == through(others[0], 2) == through(others[1], 2)
+
+
+def test_only_directions_that_newer_changes_have_not_shown_are_kept():
+    e = np.eye(3)
+    old = [(e[0], 1 * e[0]), (e[1] + e[0], 2 * e[1])]
+    kept = filtered([(e[0], 5 * e[0])], [old, [(e[1] + FILTER / 2 * e[2], 3 * e[2]), (e[2], 4 * e[2])]])
+    assert [w.max() for _, w in kept] == [2, 4]
+    assert filtered([], [old])[-1][1].max() == 1
+    assert filtered([(0 * e[0], e[0])], []) == []
+
+
+@pytest.mark.parametrize("reuse", [-1, 0.5, "many"])
+def test_a_number_of_steps_that_is_none_is_refused(reuse):
+    with pytest.raises(ValueError, match="reuse"):
+        vf.Coupling(reuse=reuse)

@@ -1,0 +1,179 @@
+"""Parallel coupling, both solvers at once: from logs, vectors, matrices and moduli, and driven by `couple`."""
+
+import numpy as np
+import pytest
+from coupling_logs import kinds, precice
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import log_uniform
+
+import verification as vf
+from ndtheory.energy_norms import parallel_factor, parallel_theta
+from verification.algorithm.rates import steps
+from verification.coupling.readings import rho_in_parallel
+from verification.coupling.spectrum import Spectrum
+
+
+class Solvers:
+    """Two linear solvers on some unknowns, the second in a unit that is larger by ``unit``."""
+
+    def __init__(self, n=12, unit=1e6, high=6.0, seed=0):
+        generator = np.random.default_rng(seed)
+        Q, R = (np.linalg.qr(generator.normal(size=(n, n)))[0] for _ in range(2))
+        self.S_n = unit * Q @ np.diag(np.geomspace(1, 4, n)) @ Q.T
+        root = np.linalg.cholesky(self.S_n)
+        self.values = np.geomspace(0.1, high, n)
+        self.S_c = root @ R @ np.diag(self.values) @ R.T @ root.T
+        self.load, self.moved = generator.normal(size=n) * unit, generator.normal(size=n)
+
+    def neumann(self, g):
+        return np.linalg.solve(self.S_n, g) + self.moved
+
+    def contact(self, u):
+        return self.load - self.S_c @ u
+
+    @property
+    def solution(self):
+        n = len(self.load)
+        return np.linalg.solve(np.eye(n) + self.S_c @ np.linalg.inv(self.S_n), self.contact(self.moved))
+
+    def rows(self, theta, count):
+        """Force and displacement of a run with constant theta, one behind the other, and their images."""
+        n, X, TX = len(self.load), [], []
+        x = np.zeros(2 * n)
+        for _ in range(count):
+            image = np.concatenate([self.contact(x[n:]), self.neumann(x[:n])])
+            X.append(x)
+            TX.append(image)
+            x = x + theta * (image - x)
+        return np.array(X), np.array(TX)
+
+    def log(self, path, theta, count=80):
+        """The residuals of both fields as preCICE logs them."""
+        X, TX = self.rows(theta, count)
+        halves = np.split(TX - X, 2, axis=1)
+        named = zip(("ResAbs(M:Force)", "ResAbs(M:Displacement)"), halves, strict=True)
+        return precice(path, [{name: np.linalg.norm(half, axis=1) for name, half in named}])
+
+
+# --- the formulas ----------------------------------------------------------------------------------------------------
+
+
+@given(st.lists(log_uniform(-3, 3), min_size=1, max_size=6), st.floats(0.01, 1))
+def test_the_roots_of_the_eigenvalues_have_the_factor_of_the_formula(values, theta):
+    found = Spectrum.of([float(value) for value in values]).parallel()
+    high = max(map(float, values))
+    assert found.factor(theta) == pytest.approx(parallel_factor(theta, high), rel=1e-9)
+    assert found.factor(float(parallel_theta(high))) <= found.factor(theta) * (1 + 1e-9)
+    assert float(rho_in_parallel(theta, found.factor(theta))) == pytest.approx(high, rel=1e-6, abs=1e-6 / theta**2)
+
+
+def test_both_solvers_on_old_data_have_these_eigenvalues():
+    solvers = Solvers(n=4, unit=3.0)
+    n = len(solvers.load)
+    J = np.block([[np.zeros((n, n)), -solvers.S_c], [np.linalg.inv(solvers.S_n), np.zeros((n, n))]])
+    found = Spectrum.of(solvers.values).parallel()
+    theta = 0.3
+    seen = np.abs(np.linalg.eigvals((1 - theta) * np.eye(2 * n) + theta * J)).max()
+    assert found.factor(theta) == pytest.approx(seen)
+
+
+# --- sources ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("theta", ["0.1", "0.14", "0.3", "0.6"])
+def test_one_log_of_both_fields_shows_rho_whether_it_falls_or_grows(tmp_path, theta):
+    solvers = Solvers()
+    found = vf.advise_logs([(solvers.log(tmp_path / "a.log", float(theta), 150), theta)], tied=True, parallel=True)
+    assert kinds(found) == ["mode-high"]
+    assert found.best.rho.value == pytest.approx(6, rel=0.05)
+    assert found.theta == pytest.approx(1 / 7, rel=0.05)
+    assert {row.method for row in found.methods} == {"constant", "aitken", "iqn-ils"}
+    constant = next(row.steps for row in found.methods if row.method == "constant" and not row.exchanged)
+    assert constant == pytest.approx(steps(parallel_factor(1 / 7, 6)) * 2 / 3, rel=0.2)  # to 1e-6
+
+
+def test_a_ratio_shows_rho_and_one_that_no_parallel_coupling_has_is_told():
+    found = vf.advise_run("0.5", "0.75", tied=True, parallel=True)
+    assert (found.best.rho.value, found.theta) == (1.25, 0.4444)
+    assert "1/(1+rho) = 0.444" in found.quote
+    assert found.to_dict()["parallel"][0]["theta"] == pytest.approx(1 / 2.25)
+    too_fast = vf.advise_run("0.5", "0.2", tied=True, parallel=True)
+    assert too_fast.theta is None
+    assert "is it serial?" in too_fast.next.why
+
+
+def test_contact_whose_residual_hardly_falls_may_be_at_a_level():
+    found = vf.advise_run("0.5", "0.99", parallel=True)
+    assert kinds(found) == ["mode-high", "level"]
+    assert found.theta is None
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e8])
+def test_vectors_of_both_fields_show_the_eigenvalues_of_the_serial_coupling(unit):
+    solvers = Solvers(n=5, unit=unit)
+    found = vf.advise_vectors(*solvers.rows(0.2, 12), tied=True, parallel=True)
+    assert (found.spectrum.low, found.spectrum.high) == pytest.approx((0.1, 6), rel=1e-3)
+    assert found.theta == pytest.approx(1 / 7, rel=0.02)
+    assert found.vectors.unknowns == 5
+    with pytest.raises(ValueError, match="both fields in a row"):
+        vf.advise_vectors(np.eye(3), np.eye(3), parallel=True)
+
+
+def test_matrices_choose_the_role_with_the_smaller_rho():
+    """Serial coupling compares the spread of both ends, which exchanging the roles does not change by much."""
+    found = vf.advise_matrices(np.diag([0.5, 6.0]), np.eye(2), tied=True, parallel=True)
+    rho = {1: 2.0, 2: 6.0}
+    assert found.neumann_body == 1
+    assert {one.neumann_body: one.theta for one in found.parallel} == pytest.approx(
+        {n: 1 / (1 + r) for n, r in rho.items()}
+    )
+    assert found.theta == pytest.approx(1 / 3, abs=1e-3)
+
+
+# --- couple ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rule", ["constant", "anderson", "iqn-ils"])
+@pytest.mark.parametrize("unit", [1.0, 1e6])
+def test_couple_drives_both_at_once_whatever_their_units_are(rule, unit):
+    solvers = Solvers(unit=unit)
+    found = vf.couple(
+        solvers.neumann, solvers.contact, start=np.zeros(12), rule=rule, theta=1 / 7, kind="tied", parallel=True,
+        max_iterations=400,
+    )  # fmt: skip
+    assert found.converged
+    assert found.force == pytest.approx(solvers.solution, rel=1e-4, abs=1e-4 * np.abs(solvers.solution).max())
+    assert solvers.neumann(found.force) == pytest.approx(found.displacement)
+    assert found.spectrum.high == pytest.approx(6, rel=0.02)
+    assert found.iterations == vf.couple(
+        Solvers(unit=unit * 1024).neumann, Solvers(unit=unit * 1024).contact, start=np.zeros(12), rule=rule,
+        theta=1 / 7, kind="tied", parallel=True, max_iterations=400,
+    ).iterations  # fmt: skip
+
+
+def test_each_solver_gets_what_the_other_answered_before():
+    given = []
+
+    def neumann(g):
+        given.append(("g", float(g[0])))
+        return 2 * g + 1
+
+    def contact(u):
+        given.append(("u", float(u[0])))
+        return 3 - u
+
+    vf.couple(neumann, contact, start=[5.0], rule="constant", theta=1, parallel=True, max_iterations=3)
+    assert given == [("g", 5.0), ("u", 0.0), ("g", 3.0), ("u", 11.0), ("g", -8.0), ("u", 7.0)]
+
+
+def test_a_field_that_has_not_arrived_keeps_the_coupling_going():
+    """The force is right from the start, in a unit in which it hides the displacement."""
+    coupling = vf.Coupling(rule="constant", theta=1, parallel=True, tolerance=1e-6)
+    coupling.see([1e9, 1.0], [1e9, 1.1])
+    assert not coupling.arrived
+    assert coupling.residual == pytest.approx(0.1 / 1.1)
+    coupling.see([1e9, 1.0], [1e9, 1.0])
+    assert coupling.arrived
+    with pytest.raises(ValueError, match="both fields"):
+        vf.Coupling(parallel=True).see([1.0], [2.0])

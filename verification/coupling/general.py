@@ -1,0 +1,83 @@
+"""Runs of couplings of kind general, of which nothing is known beforehand but that eigenvalues are real.
+
+A mode is multiplied by ``1 - theta z`` with ``z = 1 + lambda``.  A run with ratio r has all z between ``(1 - r)/theta``
+and ``(1 + r)/theta``, and one of both ends among them: an eigenvalue that changes its sign in every step, or one that
+keeps it.  The second is positive feedback where lambda < 0; a larger theta is then faster, above 1 as well.  Where a z
+is below 0 no theta converges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from verification.coupling import ends
+from verification.coupling.ends import DEAR, Box
+from verification.coupling.kinds import ANY_THETA
+from verification.coupling.readings import Made, NextRun, Observed, RunReading, few, kept, rounded_down, same_run
+from verification.coupling.spectrum import Spectrum
+
+#: Modes close to the slowest one die out so slowly that a ratio may still rise by this share of its distance from 1.
+RISES = 0.1
+
+#: A run to make has at most so many times the largest theta that falls: where it diverges it shows the largest lambda.
+FURTHER = 4.0
+
+
+def readings_of(theta: Fraction, ratio: Observed) -> tuple[RunReading, ...]:
+    """Both readings of a ratio."""
+    high, low = (1 + ratio.value) / theta - 1, (1 - ratio.value) / theta - 1
+    changes = f"a mode with lambda = {few(high)} changes its sign in every step and is the slowest"
+    keeps = f"a mode with lambda = {few(low)} keeps its sign and is the slowest"
+    if low <= -1:
+        keeps += ": no theta converges then"
+    elif low < 0:
+        keeps += ": positive feedback"
+    return (
+        RunReading(kind="mode-high", value=float(high), lo=float((1 + ratio.least) / theta - 1), says=changes),
+        RunReading(kind="mode-low", lo=float((1 - ratio.most) / theta - 1), says=keeps),
+    )
+
+
+def boxes_of(theta: Fraction, ratio: Observed) -> tuple[Box, Box]:
+    """Limits of both ends by a run."""
+    return ends.of_ratio(float(theta), float(ratio.least), float(ratio.most), rises=RISES)
+
+
+def decide(each: Sequence[Sequence[Box]], made: Sequence[Made]) -> tuple[NextRun, Spectrum | None]:
+    """The theta to paste and the spectrum that runs leave together, or the run to make next and None.
+
+    ``each`` has the boxes that each run leaves which has a steady ratio.
+    """
+    boxes, known = ends.common(each, ends.ANYTHING), [float(one.theta) for one in made]
+    falling, rising = ([one for one in made if getattr(one, name)] for name in ("falls", "rises"))
+    half = rounded_down(min(one.theta for one in made) / 2)
+    if not boxes:
+        why = "half of the smallest theta: no coupling with real eigenvalues has these ratios together"
+        return NextRun(theta=half, why=why), None
+    if not each:
+        return NextRun(theta=half, why="half of the smallest theta, until a ratio shows"), None
+    least, most = min(box.a[0] for box in boxes), max(box.b[1] for box in boxes)
+    if all(box.a[1] <= 0 for box in boxes):
+        why = f"no constant theta above 0 converges: an eigenvalue is {few(max(box.a[1] for box in boxes) - 1)} or less"
+        return NextRun(theta=half, why=f"{why}, or a solver has the wrong sign; IQN-ILS may converge"), None
+    if least <= 0:
+        why = "there no mode changes its sign: its ratio shows the least eigenvalue, or grows as for any theta"
+        return NextRun(theta=rounded_down(min(1 / most, 2 * half)), why=why), None
+    theta, cost = ends.cheapest(boxes, float(ANY_THETA))
+    if cost <= DEAR:
+        low, high = min(box.a[0] for box in boxes) - 1, most - 1
+        why = (
+            f"at most {max(cost, 1):.2g} times the fewest steps with lambda from {low:.3g} to {high:.3g}, by these runs"
+        )
+        return NextRun(theta=rounded_down(theta), why=why), Spectrum.between(low, high)
+    # the second run is below the first: it converges where that does, and shows which end does not change the sign
+    largest = max((float(one.theta) for one in falling), default=min(known))
+    below = min([float(one.theta) for one in rising], default=float(ANY_THETA))
+    theta = ends.telling(boxes, known, below if len(made) > 1 else min(known))
+    theta = min(theta, FURTHER * largest)
+    if any(same_run(theta, one.theta) for one in made):
+        best = min(falling or made, key=lambda one: (one.ratio is None, one.ratio or 0))
+        return kept(best.theta, "no other theta is worth a run"), None
+    why = f"its ratio shows which reading is right: lambda is from {least - 1:.3g} to {most - 1:.3g} by the runs so far"
+    return NextRun(theta=rounded_down(theta), why=why), None
