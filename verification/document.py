@@ -56,11 +56,6 @@ class Document(Value, keys.Part, ABC):
     #: The problem of the result; None where there is none.
     problem: Problem | None = None
 
-    @classmethod
-    def key_table(cls) -> str:
-        """The name of the table of its keys: the schema, with the kind where several documents share one."""
-        return ", ".join(filter(None, (cls.schema, cls.kind)))
-
     def content(self) -> dict[str, Any]:
         """Return the values of the document besides schema, version, units and problem."""
         return keys.document(self)

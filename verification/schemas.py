@@ -41,7 +41,8 @@ def tables() -> dict[str, tuple[Row, ...]]:
     """Return the rows of each table, by the schema of a document or the name of a part."""
     for table in ("documents", "bounds"):  # whose parts are the keys
         registry.load(table, "")
-    classes = {each.key_table(): each for each in subclasses(Document) if keys.keys(each) and vars(each).get("schema")}
+    written = [each for each in subclasses(Document) if keys.keys(each) and vars(each).get("schema")]
+    classes = {", ".join(filter(None, (each.schema, each.kind))): each for each in written}
     parts = {part: each for each in subclasses(keys.Part) if (part := vars(each).get("part"))}
     made = {
         name: header(cls) + ((included(cls.part),) if cls.part else keys.rows(cls)) for name, cls in classes.items()

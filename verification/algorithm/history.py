@@ -75,10 +75,6 @@ class Promise(Part):
     steps: int | None = key("number of steps that suffice", null="without a factor", why=None)
 
 
-def _no_residual(increment: Increment) -> str:
-    return NO_ITERATION if increment.run is None else NO_FORCE
-
-
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Increment(Value, Part):
     """An increment that was computed.
@@ -190,7 +186,10 @@ class Increment(Value, Part):
         return None if self.run is None or self.run.linearised is None else self.run.linearised.rate
 
     @property
-    @says(null="with the global method, and without a force", why=_no_residual)
+    @says(
+        null="with the global method, and without a force",
+        why=lambda increment: NO_ITERATION if increment.run is None else NO_FORCE,
+    )
     def coupled_residual(self) -> float | None:
         """Coupled residual of its run."""
         return None if self.run is None else self.run.coupled_residual

@@ -297,7 +297,7 @@ class Proof:
         V = np.zeros((A.middle.shape[0], b))
         V[interface] = np.eye(b)
         V[inside] = own.elastic.lift
-        form = _congruence(H, V)
+        form = Enclosed.exactly(V.T).times(_product(H, V)).symmetric()
         error = 0.0  # the square of the H1 norm of what the lift is off by, over |phi|^2
         if len(inside):
             rest = _product(A.block(inside, np.arange(A.middle.shape[0])), V)
@@ -344,11 +344,6 @@ def _product(A: Enclosed, V: Floats) -> Enclosed:
     radius = A.radius @ sizes + gamma(terms + 1) * (abs(A.middle) @ sizes)
     most = int(np.max(terms, initial=0)) + int(np.max(np.diff(A.radius.tocsr().indptr), initial=0))
     return Enclosed(middle=np.asarray(A.middle @ V), radius=np.asarray(upwards(radius, most + 8)))
-
-
-def _congruence(H: Enclosed, V: Floats) -> Enclosed:
-    """``V' H V``."""
-    return Enclosed.exactly(V.T).times(_product(H, V)).symmetric()
 
 
 def _least(A: Enclosed) -> float | None:

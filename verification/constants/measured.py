@@ -160,18 +160,14 @@ class Measured(Document):
         """Why there are none; empty where there are."""
         return self._of_cells.why
 
-    @property
-    def _exact_friction(self) -> Fraction:
-        """k as the problem has it, which may be 1/3."""
-        return exact(self.friction) if self.problem is None else self.problem.contact.friction
-
     def constants(self) -> Constants | None:
         """The constants of Section 5; None where C_R or C_K does not exist, or m is 0."""
         if self.m is None or self.M is None or self.C_R is None or self.C_K is None or not self.m.value:
             return None
         friction: dict[str, Any] = {"C_K": 0}  # without a law of friction
         if self.C_s is not None and self.C_tr is not None:
-            friction = {"C_s": self.C_s, "C_tr": self.C_tr, "k": self._exact_friction}
+            k = exact(self.friction) if self.problem is None else self.problem.contact.friction  # which may be 1/3
+            friction = {"C_s": self.C_s, "C_tr": self.C_tr, "k": k}
         # C_R >= 1 by definition; two identical bodies reach it up to rounding
         C_R = self.C_R if self.C_R.value >= 1 else Number.of_float(1.0)
         return Constants(m=self.m, M=self.M, C_R=C_R, **friction)

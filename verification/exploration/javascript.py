@@ -69,16 +69,12 @@ class Condition(Scalar):
     """The truth of a comparison, for :func:`ndtheory.scalar.where`."""
 
     def where(self, a: Any, b: Any) -> Any:
-        return self._new(f"{self.text} ? {text(a)} : {text(b)}", Condition if _is_condition(a) else None)
+        return self._new(f"{self.text} ? {text(a)} : {text(b)}", Condition if isinstance(a, Condition | bool) else None)
 
     def __and__(self, other: Any) -> Any:
         return self._new(f"{self.text} && {text(other)}", Condition)
 
     __rand__ = __and__
-
-
-def _is_condition(value: Any) -> bool:
-    return isinstance(value, Condition | bool)
 
 
 def text(value: Any) -> str:

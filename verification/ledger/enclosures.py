@@ -377,16 +377,6 @@ class EnclosedConstants(RightSides):
         """(5.37)."""
         return 2 * self.give / (1 + 2 * self.give)
 
-    @property
-    def below_C_0(self) -> Fraction:
-        """A theta that is proved to lie below C_0."""
-        return three_digits(float(JUST_BELOW) * float(self.C_0.lo))
-
-    @property
-    def at_C_0(self) -> Fraction:
-        """The smallest theta that is proved not to lie below C_0."""
-        return Fraction(self.C_0.hi)
-
     def contracting(self) -> EnclosedConstants:
         """The same at a friction below C_2, as repaired."""
         slight = three_digits(float(JUST_BELOW) * self.bodies.case.reading.threshold / float(self.C_K.hi))
@@ -478,9 +468,9 @@ def both_sides(d: Any, r: Any, key: Key) -> Sides:
         inequality, r = ENTRIES["prop-5.6.1", of], r.contracting()
         theta = r.inside(CONTRACTION[key])
     elif id == "5.39":
-        theta = r.at_C_0
+        theta = Fraction(r.C_0.hi)  # the smallest one that is proved not to lie below C_0
     elif id == "5.44" or key in OF_MUCH:
-        theta = r.below_C_0
+        theta = three_digits(float(JUST_BELOW) * float(r.C_0.lo))  # proved to lie below C_0
     terms = [*terms_of(inequality.left(d, r, theta)), *(-term for term in terms_of(inequality.right(d, r, theta)))]
     left = sum((term for term in terms if term.hi > 0), Interval.of(0))
     right = sum((-term for term in terms if term.hi <= 0), Interval.of(0))

@@ -114,10 +114,10 @@ def verify(
     for s in chosen:
         own = s.kind == "own"  # not printed anywhere
         seen = [replace(e, of="repaired") if own and e.holds else e for e in evidence[s.id]]
-        entries = _by_strength([*seen, *_read(s, seen)])
+        entries = sorted([*seen, *_read(s, seen)], key=lambda e: METHODS.index(e.method))
         verdict, method = settle(entries)
         rows.append(
-            Finding(statement=s, evidence=entries, verdict=verdict, method=method, recorded=recorded().get(s.id))
+            Finding(statement=s, evidence=tuple(entries), verdict=verdict, method=method, recorded=recorded().get(s.id))
         )
     return Ledger(rows=tuple(_grounded(rows)), level=level, units={"length": "any", "stress": "any"})
 
@@ -134,10 +134,6 @@ def _read(statement: Statement, found: Sequence[Evidence]) -> list[Evidence]:
         if statement.repair and not any(e.of == "repaired" and e.method == "symbolic" for e in found):
             entries.append(entry("repaired", True, statement.proof))
     return entries
-
-
-def _by_strength(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
-    return tuple(sorted(evidence, key=lambda e: METHODS.index(e.method)))
 
 
 def _grounded(rows: Sequence[Finding]) -> list[Finding]:

@@ -7,6 +7,9 @@ from verification.reproduce.claims import CLAIMS, zones
 from verification.reproduce.experiments import Outcome, Reproduction, Result
 from verification.show.parts import Facts, Section, Sections, closing, section, table
 
+#: A reading that shows its figure, one that does not, and one of which nothing was computed.
+WORDS = {True: "yes", False: "no", None: "refused"}
+
 
 @registry.sections.register
 def sections(found: Reproduction) -> Sections:
@@ -37,7 +40,7 @@ def _figure(result: Result) -> Section:
     if held:
         assumed = "; ".join(", ".join([*reading.assumes, *reading.departs]) for reading in held[:3])
         notes.append(f"under the assumption that {assumed}")
-    rows = [(_short(outcome), _word(outcome), _says(outcome)) for outcome in shown]
+    rows = [(_short(outcome), WORDS[outcome.holds], _says(outcome)) for outcome in shown]
     title = f"{result.figure.upper()}: {result.verdict.upper()}"
     claims = f"the paper: {claim.says}", f"reproduced means: {claim.criterion}"
     return section(result.figure, title, *claims, table(("reading", "", "what it shows"), rows), *notes)
@@ -53,10 +56,6 @@ def _short(outcome: Outcome) -> str:
         "" if reading.moduli == "as printed" else "moduli exchanged",
     ]
     return ", ".join(filter(None, parts))
-
-
-def _word(outcome: Outcome) -> str:
-    return {True: "yes", False: "no", None: "refused"}[outcome.holds]
 
 
 def _says(outcome: Outcome) -> str:
