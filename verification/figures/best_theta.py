@@ -53,8 +53,7 @@ def draw_best_theta(panels: list[Panel], x: str) -> Figure:
         for ax, panel in zip(grid, panels, strict=True):
             _draw(ax, panel)
             ax.set(xscale="log", xlabel=plain(x), title=plain(panel.title))
-            ax.set_yscale("logit")
-            ax.set_ylim(0.007, 0.996)
+            ax.set(yscale="logit", ylim=(0.007, 0.996))
             ax.set_yticks(TICKS, [f"{theta:g}" for theta in TICKS])
             ax.set_yticks([], minor=True)
             ax.grid(color="0.9", linewidth=0.6)

@@ -38,10 +38,7 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
             if best.theta_proved is not None and best.factor_proved is not None:
                 ax.plot([best.theta_proved], [best.factor_proved.value], "o", color=colour, markersize=5)
         ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
-        ax.set_xlim(0, 1)
-        ax.set_ylim(0, 1.5)
-        ax.set_xlabel(THETA)
-        ax.set_ylabel("factor of one step")
+        ax.set(xlim=(0, 1), ylim=(0, 1.5), xlabel=THETA, ylabel="factor of one step")
         ax.set_title("How much one step changes the distance of two forces")
         legend_beside(ax)
     return figure

@@ -92,9 +92,8 @@ def _states(history: History) -> Figure:
         if number > 1:
             ax.axhline(first + 0.5, color="0.1", linewidth=1.0)
         ax.text(1.01, (first + 1 + end) / 2, plain(name), transform=ax.get_yaxis_transform(), va="center")
-    ax.set_xlabel(f"position along $\\Gamma_c$ [{plain(history.problem.units['length'])}]")
-    ax.set_ylabel("increment")
-    ax.set_title(plain(history.problem.title))
+    position = f"position along $\\Gamma_c$ [{plain(history.problem.units['length'])}]"
+    ax.set(xlabel=position, ylabel="increment", title=plain(history.problem.title))
     patches = [Patch(facecolor=colour, edgecolor="0.4", label=state) for state, colour in MAP.items()]
     figure.legend(handles=patches, loc="outside lower center", ncols=3)
     return figure

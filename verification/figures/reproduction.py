@@ -37,8 +37,7 @@ def _zones(result: Result, ax: Any) -> None:
     mark_states(ax, contact.status, x, contact.pressure)
     for _, end in ZONES[:-1]:
         ax.axvline(end, color="0.5", linestyle=":", label="printed ends of zones" if end == ZONES[0][1] else None)
-    ax.set_xlabel("x from the left end of Gamma_c (mm)")
-    ax.set_ylabel("pressure (MPa)")
+    ax.set(xlabel="x from the left end of Gamma_c (mm)", ylabel="pressure (MPa)")
     legend_beside(ax)
 
 
@@ -48,10 +47,7 @@ def _curves(result: Result, ax: Any) -> None:
         points = [(theta, n) for theta, n in curve.steps.items() if n is not None]
         if points:
             ax.plot(*zip(*points, strict=True), f"{marker}-", color=shade, markersize=3.5, label=curve.label)
-    ax.set_xlim(0, 1)
-    ax.set_yscale("log")
-    ax.set_xlabel(THETA)
-    ax.set_ylabel("steps, increment test")
+    ax.set(xlim=(0, 1), yscale="log", xlabel=THETA, ylabel="steps, increment test")
     legend_beside(ax)
 
 

@@ -42,8 +42,7 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
             floor = noise(run.pair, run.last) / run.last.scale
             ax.axhline(floor, color="0.55", linewidth=0.8, linestyle=":", label="rounding")
         ax.axhline(run.pair.settings.tolerance, color="0.2", linewidth=0.8, linestyle=":", label="tolerance")
-        ax.set_xlabel("evaluations of T")
-        ax.set_ylabel("residual |||T g - g|||, relative to the forces")
+        ax.set(xlabel="evaluations of T", ylabel="residual |||T g - g|||, relative to the forces")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}")
         legend_beside(ax)

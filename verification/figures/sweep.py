@@ -58,9 +58,7 @@ def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figur
                         *zip(*pairs, strict=True), f"{MARKERS[i % len(MARKERS)]}-", color=shade, ms=3.5, label=label
                     )
                     label = None
-        ax.set_xlabel(plain(title(x, sweep.units)))
-        ax.set_ylabel(plain(title(y, sweep.units)))
-        ax.set_title(plain(sweep.summary))
+        ax.set(xlabel=plain(title(x, sweep.units)), ylabel=plain(title(y, sweep.units)), title=plain(sweep.summary))
         if any(key for key in colours):
             legend_beside(ax)
     return figure

@@ -55,8 +55,7 @@ def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None
     ax.set_yticks(range(len(labels)), labels)
     ax.invert_yaxis()
     ax.set_xlim(right=1.12 * farthest)
-    ax.set_xlabel("powers of ten lost")
-    ax.set_title(fill(title, 64))
+    ax.set(xlabel="powers of ten lost", title=fill(title, 64))
 
 
 def _in_words(label: str) -> str:
