@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import click
@@ -21,16 +22,18 @@ from verification.sections.bounds import sections
 #: The options by the constants that they give.
 OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
 
+_number = partial(click.option, metavar="NUMBER")
+
 
 @cli.command()
-@click.option("--m", "m", metavar="NUMBER", help="Smaller coercivity m^a of the bodies (stress).")
-@click.option("--M", "M", metavar="NUMBER", help="Sum of the continuity constants M^a (stress), so at least 2 m.")
-@click.option("--CR", "C_R", metavar="NUMBER", help="Lift constant, at least 1.")
-@click.option("--Cs", "C_s", metavar="NUMBER", help="Constant of w -> S(sigma_N(w)) into L2.")
-@click.option("--Ctr", "C_tr", metavar="NUMBER", help="Constant of the tangential trace into L2.")
-@click.option("--k", "k", metavar="NUMBER", help="Coefficient of friction.")
-@click.option("--CK", "C_K", metavar="NUMBER", help="Product k Cs Ctr (stress), instead of those three.")
-@click.option("--theta", "theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1.")
+@_number("--m", "m", help="Smaller coercivity m^a of the bodies (stress).")
+@_number("--M", "M", help="Sum of the continuity constants M^a (stress), so at least 2 m.")
+@_number("--CR", "C_R", help="Lift constant, at least 1.")
+@_number("--Cs", "C_s", help="Constant of w -> S(sigma_N(w)) into L2.")
+@_number("--Ctr", "C_tr", help="Constant of the tangential trace into L2.")
+@_number("--k", "k", help="Coefficient of friction.")
+@_number("--CK", "C_K", help="Product k Cs Ctr (stress), instead of those three.")
+@_number("--theta", "theta", help="Relaxation factor, 0 < theta < 1.")
 @click.option(
     "--edition",
     type=OneOf([*(edition.name for edition in EDITIONS), "both"]),
@@ -38,19 +41,9 @@ OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
     show_default=True,
     help="Editions of Section 5.",
 )
-@click.option("--rho", metavar="NUMBER", help="Bound in energy norms: stiffness ratio of the bodies on Gamma_c.")
-@click.option(
-    "--kappa1",
-    "kappa_1",
-    metavar="NUMBER",
-    help="Bound in energy norms: k C_s_energy C_t1, see `constants`; 0 without friction.",
-)
-@click.option(
-    "--kappa2",
-    "kappa_2",
-    metavar="NUMBER",
-    help="Bound in energy norms: k C_s_energy C_t2, see `constants`; 0 without friction.",
-)
+@_number("--rho", help="Bound in energy norms: stiffness ratio of the bodies on Gamma_c.")
+@_number("--kappa1", "kappa_1", help="Bound in energy norms: k C_s_energy C_t1, see `constants`; 0 without friction.")
+@_number("--kappa2", "kappa_2", help="Bound in energy norms: k C_s_energy C_t2, see `constants`; 0 without friction.")
 @one_file(".svg", ".png", words="Figure to draw: h_1 and h_2, which bound the squared factor, over theta")
 @click.option("--check", is_flag=True, help="Exit 1 unless contraction at theta is proved.")
 @JSON
