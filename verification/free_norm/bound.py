@@ -167,7 +167,7 @@ def _work_out(
     progress("free norm: best theta", None)
     best = None if largest is None else free.best_theta(largest.theta)
     allowed = _friction(pair, measured, progress)
-    number: dict[str, Number | None] = {
+    number: dict[str, Any] = {
         "factor": None if proof is None else Number.of_float(proof.factor),
         "factor_best": None if best is None else Number.of_float(best.factor),
         "theta_max": None if largest is None else Number.of_float(largest.theta),
@@ -179,10 +179,7 @@ def _work_out(
         proofs = {"factor": (theta, proof), "factor_best": (exact, best), "theta_max": (None, largest)}
         number, unverified = _verified(pair, number, proofs, allowed, progress)
     return FreeNormOfPair(
-        factor=number["factor"],
-        factor_best=number["factor_best"],
-        theta_max=number["theta_max"],
-        friction_threshold=number["friction_threshold"],
+        **number,
         condition=None if proof is None else proof.norm.condition,
         radius=largest_radius(pair, float(theta)).value,
         theta_best=None if best is None else best.theta,

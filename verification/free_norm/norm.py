@@ -124,13 +124,15 @@ class FreeNorm:
         if border is None:
             return None
         thetas = (border[0] * (1 - share) for share in INSIDE)
-        proofs = (self._at_most_one(theta, border[1] if theta == border[0] else at(theta)) for theta in thetas)
+        proofs = (
+            self._at_most(theta, 1.0, border[1] if theta == border[0] else at(theta), factor=1.0) for theta in thetas
+        )
         return next(filter(None, proofs), None)
 
     def every_small_theta(self) -> Proved | None:
         """The proof that every theta up to SMALL contracts; None where none is found."""
         with one_thread():
-            return self._at_most_one(SMALL, self._circles.find(disk(SMALL, 1.0)))
+            return self._at_most(SMALL, 1.0, self._circles.find(disk(SMALL, 1.0)), factor=1.0)
 
     def best_theta(self, largest: float) -> Proved | None:
         """The proof for the theta whose factor is least, below the largest one that contracts."""
@@ -147,14 +149,12 @@ class FreeNorm:
     ) -> Proved | None:
         """The proof of a factor further from 0 than its border by a share of what is left to 1."""
         q = border[0] + share * (1 - border[0])
-        circle = at(q) if share else border[1]
-        found = None if circle is None else self._circles.norm(theta, q, circle)
-        return None if found is None else self._proof(theta, *found)
+        return self._at_most(theta, q, at(q) if share else border[1])
 
-    def _at_most_one(self, theta: float, circle: Circle | None) -> Proved | None:
-        """The proof that no step of theta is longer, from a circle of q = 1."""
-        found = None if circle is None else self._circles.norm(theta, 1.0, circle)
-        return None if found is None else self._proof(theta, *found, factor=1.0)
+    def _at_most(self, theta: float, q: float, circle: Circle | None, factor: float | None = None) -> Proved | None:
+        """The proof of a factor, the least one by default, from a circle of q."""
+        found = None if circle is None else self._circles.norm(theta, q, circle)
+        return None if found is None else self._proof(theta, *found, factor=factor)
 
     def _proof(self, theta: float, norm: Floats, multipliers: Weights, factor: float | None = None) -> Proved | None:
         """The proof by a norm, in coordinates in which (5.21) is Euclidean, and its multipliers.
