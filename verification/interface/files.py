@@ -105,7 +105,7 @@ def read_interface(path: Path) -> ContactPair:
         raise refuse("", why)
     try:
         with path.open("rb") as file:
-            unpacked = sum(header.bytes for header in headers(file))
+            unpacked = sum(header.entries * header.entry_bytes for header in headers(file))
             if unpacked > MOST_BYTES:
                 raise refuse("", f"needed arrays of at most {MOST_BYTES} bytes together, received {unpacked}")
             file.seek(0)

@@ -218,11 +218,6 @@ class Header:
     entries: int
     entry_bytes: int
 
-    @property
-    def bytes(self) -> int:
-        """Memory for the array."""
-        return self.entries * self.entry_bytes
-
 
 def headers(file: BinaryIO) -> Iterator[Header]:
     """Yield the headers of all arrays in a file ``.npy`` or ``.npz``; raise one of UNREADABLE for any other file.
