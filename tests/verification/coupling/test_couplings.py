@@ -209,6 +209,28 @@ def test_the_recorded_table_keeps_what_its_page_says():
     assert all(one["verdicts"]["vectors"] != "wrong" for one in record["advice"])
 
 
+def test_the_record_of_other_kinds_has_ten_of_each_and_no_theta_that_diverges():
+    record = json.loads((BENCHMARKS / "records" / "advice" / "kinds.json").read_text("utf-8"))
+    assert {kind: len(some) for kind, some in record["kinds"].items()} == {"general": 10, "parallel": 10}
+    for some in record["kinds"].values():
+        verdicts = [verdict for one in some for verdict in one["verdicts"].values()]
+        assert "wrong" not in verdicts
+        assert verdicts.count("right") >= 0.8 * len(verdicts)
+        assert all(one["converged"] for one in some)
+        assert sum(one["unseen"] for one in some) >= 4
+
+
+def test_two_couplings_of_other_kinds_have_their_recorded_verdicts(made, monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    bench = import_module("bench_kinds")
+    record = json.loads((BENCHMARKS / "records" / "advice" / "kinds.json").read_text("utf-8"))["kinds"]
+    for kind, some in (("general", bench.loops()), ("parallel", bench.at_once())):
+        known = list(zip(some, record[kind], strict=True))
+        for n in range(10) if AT_NIGHT else (3,):
+            loop, recorded = known[n]
+            assert bench.judged(loop, n if n % 2 else None)["verdicts"] == recorded["verdicts"], loop.name
+
+
 @pytest.mark.parametrize("full", [False, True])
 def test_a_record_of_some_first_thetas_alone_never_takes_the_place_of_all(made, tmp_path, monkeypatch, capsys, full):
     bench = import_module("bench_couplings")
