@@ -185,7 +185,10 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("if dear <= DEAR:", "if True:"),
         ("most if tied else min([most, *rising])", "most"),
         ("if ratio >= predicted_rate(rho):", "if True:"),
-        ("*(([], []) if friction else bounds(seen))", "*bounds(seen)"),
+        (
+            "*(([], []) if friction or not of.signed else bounds(seen, parallel=of.parallel))",
+            "*bounds(seen, parallel=of.parallel)",
+        ),
         ("readings_with_friction(readings), None", "readings, rho"),
         ("hi = min(upper", "hi = max(upper"),
         ("if interval.contradiction is not None", "if False"),
