@@ -134,9 +134,9 @@ class Advice(Document):
         assert role.rho is not None
         rho, least = role.rho.value, None if role.rho_min is None else role.rho_min.value
         forms = {"1/(1+rho)": 1 / (1 + rho)} if self.coupling.parallel else {"2/(2+rho)": 2 / (2 + rho)}
-        if least is not None and not self.coupling.parallel:
-            forms["2/(2+rho_min+rho)"] = 2 / (2 + least + rho)
-        near = (form for form in reversed(forms) if abs(forms[form] - theta) <= SAME_THETA * theta)
+        if least is not None and self.tied and not self.coupling.parallel:
+            forms = {"2/(2+rho_min+rho)": 2 / (2 + least + rho)} | forms
+        near = (form for form in forms if abs(forms[form] - theta) <= SAME_THETA * theta)
         return next(near, "the theta of least factor over the eigenvalues and their errors")
 
     methods: tuple[MethodRow, ...] = key(
