@@ -41,6 +41,9 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, kind: Kind) -
     if set(NEEDED) <= held:
         if others:
             raise click.UsageError(f"received {others[0]} with {S1}: an interface file has all of it", context)
+        if kind.parallel or not kind.signed:
+            needed = "an interface file is of two bodies in serial coupling, which are tied or in contact"
+            raise click.UsageError(f"received {kind.typed}with {S1}: {needed}", context)
         return advise(S1, tied=kind.linear, progress=tell)
     if S2 is None and not {"S1", "S2"} <= held:
         raise click.UsageError(f"{S1}: needed both --S1 and --S2, or one file with arrays S1 and S2", context)
@@ -93,6 +96,9 @@ def of_kind(command: Callable[..., None]) -> Callable[..., None]:
     def typed(kind: str | None, tied: bool, parallel: bool, **given: Any) -> None:
         if tied and kind not in (None, "tied"):
             needed = f"received --tied with --kind {kind}: needed one of them"
+            raise click.UsageError(needed, click.get_current_context())
+        if parallel and given.get("snippets"):
+            needed = "received --snippets with --parallel: the blocks are of serial coupling"
             raise click.UsageError(needed, click.get_current_context())
         command(kind=kind_of(kind, tied=tied, parallel=parallel), **given)
 

@@ -42,7 +42,7 @@ class Parallel(Part):
     def of(cls, role: Role) -> Parallel:
         """For a role that is not refused."""
         assert role.rho is not None
-        if role.level == "estimated" and role.spectrum is not None:
+        if role.spectrum is not None and (role.level == "estimated" or not role.spectrum.real):
             both = role.spectrum.parallel()
             theta, factor = both.theta, both.factor(both.theta)
         else:

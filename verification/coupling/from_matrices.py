@@ -167,14 +167,14 @@ def advise_matrices(
     refused = _refused(sides, P, functions)
     lanczos: list[SeenLanczos] = []
     if friction is None:
-        roles = {
-            body: _by_eigenvalues(body, sides, P, of.least) for body in BODIES if body not in refused and not functions
-        }
+        roles = {body: _by_eigenvalues(body, sides, P, of) for body in BODIES if body not in refused and not functions}
         for body in BODIES:
             if functions and body not in refused:
                 roles[body], seen = _by_lanczos(body, sides, P, progress)
                 lanczos.append(seen)
         both = tuple((refused | roles)[body] for body in BODIES)
+        if all(role.rho is None for role in both):
+            raise ValueError(f"body 1: {both[0].reason['rho']}; body 2: {both[1].reason['rho']}")
         symmetric = all(side.seen.asymmetry is None or side.seen.asymmetry <= TOLD for side in sides.values())
         if not functions and P is None and not refused and symmetric:
             both = with_both_ends(both)
@@ -229,7 +229,7 @@ def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[BodyNumb
     return refused
 
 
-def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None, lowest: float) -> Role:
+def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None, kind: Kind) -> Role:
     """The role in which a body has the Neumann problem, by the eigenvalues of (P' S_c P, S_n), which may be complex."""
     contact, neumann = sides[other(body)].matrix, sides[body].matrix
     assert contact is not None
@@ -241,7 +241,11 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None, lowest: 
         S_c = S_c if P is None else P.carry_back(P.carry_back(S_c.T).T)
         with one_thread():
             spectrum = Spectrum.of(np.linalg.eigvals(np.linalg.solve(S_n, S_c)) * float(unit))
-        return role_on(body, spectrum, least=lowest, nothing=WORD_OF_ASYMMETRY)
+        if not (spectrum.parallel() if kind.parallel else spectrum).theta:
+            return Role.refused(
+                body, ValueError(f"no theta above 0 converges, by eigenvalues from {spectrum.low:.3g} on")
+            )
+        return role_on(body, spectrum, least=kind.least, nothing=WORD_OF_ASYMMETRY)
     if P is not None:
         S_c = P.carry_back(P.carry_back(S_c).T)
         S_c = (S_c + S_c.T) / 2

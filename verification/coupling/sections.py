@@ -164,6 +164,14 @@ def _which_theta(found: Advice) -> Section:
     rows: list[tuple[Cell, ...]] = []
     why = {}
     possible = [role for role in found.roles if role.rho is not None]
+    heads = ("Neumann", "rho", "theta is", "theta", "per step", "to 1e-9", "note")
+    if found.coupling.parallel:
+        for role in possible:
+            best, a_step = found.chosen(role)
+            shown = figures(best), near_one(a_step), count(steps(a_step))
+            rows.append((name_of(found, role.neumann_body), figures(role.rho), "1/(1+rho)", *shown, "not a bound"))
+        words = "Predicted for parallel coupling, where nothing opens or slips."
+        return section("theta", "WHICH THETA?", table(heads, rows), words)
     for role in possible:
         name, rate = name_of(found, role.neumann_body), role.predicted[1]
         theta, bound = figures(role.theta_predicted), "proved" if role.proved else "not a bound"
@@ -194,8 +202,7 @@ def _which_theta(found: Advice) -> Section:
     said += [
         _cells(found, role, role.cells) for role in possible if role.cells is not None and role.cells.found is not None
     ]
-    lines = table(("Neumann", "rho", "theta is", "theta", "per step", "to 1e-9", "note"), rows)
-    return section("theta", "WHICH THETA?", lines, *said)
+    return section("theta", "WHICH THETA?", table(heads, rows), *said)
 
 
 def _cells(found: Advice, role: Role, seen: Suggested) -> str:

@@ -104,8 +104,13 @@ class Spectrum(Value):
 
     @property
     def theta(self) -> float:
-        """The theta of least factor, the ends as far apart as their errors allow; ``2/(2+low+high)`` if it is real."""
+        """The theta of least factor, the ends as far apart as their errors allow; ``2/(2+low+high)`` if it is real.
+
+        0 where a mode grows for any theta above 0.
+        """
         low, high = self.low - self.error_low, self.high + self.error_high
+        if self.low <= -1:
+            return 0.0
         if self.real:
             return 2 / (2 + (max(low, 0.0) if self.low >= 0 else low) + high)
         z = 1 + self.values

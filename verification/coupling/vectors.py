@@ -132,7 +132,7 @@ class Vectors(Evidence, Value):
 
     def spectra(self) -> tuple[Role, ...]:
         """The roles of the run; rho is only bounded while the largest eigenvalue is not found."""
-        if self.negative or not self.settled or (self.apart or 0.0) > LOUD:
+        if self.no_map or self.negative or not self.settled:
             return ()
         if self.high_found:
             return (self.estimated(self.seen, "vectors"),)
@@ -158,11 +158,8 @@ class Vectors(Evidence, Value):
     @property
     def why_no_theta(self) -> str:
         """Why no theta follows."""
-        if self.negative:
-            return self.negative
-        if (self.apart or 0.0) > LOUD:
-            share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
-            return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
+        if why := self.no_map or self.negative:
+            return why
         if not self.settled:
             return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.high_found:
@@ -173,12 +170,24 @@ class Vectors(Evidence, Value):
         return f"{said}; continue the run with IQN-ILS, and give more of its vectors"
 
     @property
+    def no_map(self) -> str:
+        """Why T is no map of these vectors; empty where it may be one."""
+        if (self.apart or 0.0) > LOUD:
+            share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
+            return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
+        if self.kind.parallel and (self.noise or 0.0) > 1:
+            return "images do not follow from the other field: needed both fields in a row, and their images likewise"
+        return ""
+
+    @property
     def negative(self) -> str:
         """Why eigenvalues below 0 leave no theta; empty where there are none of these."""
-        if (self.apart or 0.0) > LOUD:
+        if self.no_map:
             return ""
         if self.kind.signed and self.ritz.real.max() < -REAL:
             return f"all eigenvalues are negative: {WRONG_SIGN}"
+        if self.kind.parallel and not self.spectrum.parallel().theta:
+            return "with both solvers at once no theta above 0 converges: run one after the other"
         if self.ritz.real.min() <= RANK - 1:
             return f"an eigenvalue is {self.ritz.real.min():.3g}: with -1 or less no theta above 0 converges"
         return ""

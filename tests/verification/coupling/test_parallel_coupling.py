@@ -120,6 +120,30 @@ def test_vectors_of_both_fields_show_the_eigenvalues_of_the_serial_coupling(unit
         vf.advise_vectors(np.eye(3), np.eye(3), parallel=True)
 
 
+def test_images_that_do_not_follow_from_the_other_field_are_told():
+    X = np.random.default_rng(0).normal(size=(9, 12))
+    found = vf.advise_vectors(
+        np.tile(X, (2, 1)), np.random.default_rng(1).normal(size=(18, 12)), tied=True, parallel=True
+    )
+    assert found.theta is None
+    assert found.roles == ()
+
+
+@pytest.mark.parametrize("skew", [0.2, 1.0, 8.0])
+def test_eigenvalues_that_are_complex_leave_a_parallel_theta_or_none(skew):
+    """The factor is that of both solvers on old data, and where some mode grows for any theta the role is refused."""
+    S_c, S_n = np.array([[1.0, skew], [-skew, 1.0]]), np.eye(2)
+    joint = 1 + Spectrum.of(np.linalg.eigvals(S_c)).parallel().values
+    found = vf.advise_matrices(S_c, S_n, tied=True, parallel=True)
+    second = next(role for role in found.roles if role.neumann_body == 2)
+    assert (second.rho is None) == (joint.real.min() <= 0)
+    assert second.rho is not None or "no theta above 0 converges" in second.reason["rho"]
+    for one in found.parallel:
+        own = joint if one.neumann_body == 2 else 1 + Spectrum.of(1 / np.linalg.eigvals(S_c)).parallel().values
+        assert one.factor == pytest.approx(np.abs(1 - one.theta * own).max())
+        assert all(one.factor <= np.abs(1 - theta * own).max() + 1e-9 for theta in np.linspace(0, 1, 201))
+
+
 def test_matrices_choose_the_role_with_the_smaller_rho():
     """Serial coupling compares the spread of both ends, which exchanging the roles does not change by much."""
     found = vf.advise_matrices(np.diag([0.5, 6.0]), np.eye(2), tied=True, parallel=True)
