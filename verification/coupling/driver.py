@@ -30,8 +30,8 @@ FIRST = Fraction(1, 2)
 #: first FIRST_ONES too, in which the modes are that have died out since.
 REMEMBERED, FIRST_ONES = 20, 10
 
-#: The size of a field that a parallel coupling has not seen to change.
-UNKNOWN = 1.0
+#: Numbers beyond this end a coupling: it has diverged.
+FAR_AWAY = 1e50
 
 #: Number of steps over which the pace of the residual is measured.
 PACE = 4
@@ -42,6 +42,10 @@ GROWING = 3
 Solver = Callable[[Floats], Any]
 
 
+class _RunAway(Exception):
+    """Numbers beyond FAR_AWAY: the coupling has diverged."""
+
+
 class CouplingError(RuntimeError):
     """A solver returned something other than a vector of finite numbers."""
 
@@ -50,7 +54,7 @@ class Coupling:
     """The next force of a coupling whose loop is yours, and what its vectors show.
 
     In *parallel* coupling its vectors have both fields, the force and behind it the displacement, of one length.  Each
-    is measured by its first residual, so that no unit counts.
+    is measured by its first residual above 0, so that no unit counts.
 
     In a loop over time call :meth:`new_step` at the start of each step, and :meth:`see` for the last evaluation of it.
     It may be copied and pickled, for restarts and for steps in time that are tried again.
@@ -138,10 +142,17 @@ class Coupling:
         """The next force after an evaluation that was taken in."""
         if not self.kind.parallel:
             return self._following(g, Tg)
-        if self._scale is None:
-            sizes = [float(np.linalg.norm(r)) or UNKNOWN for r in np.split(Tg - g, 2)]
-            self._scale = np.repeat(sizes, len(g) // 2)
+        if self._scale is None:  # a field has not moved yet
+            return g + self.theta * (Tg - g)
         return self._following(g / self._scale, Tg / self._scale) * self._scale
+
+    @property
+    def size(self) -> float:
+        """``|Tg - g|`` of the last evaluation; of parallel coupling over its first size, which is 1."""
+        g, Tg, _ = self._seen[-1]
+        if self.kind.parallel and self._scale is None:
+            return 1.0
+        return float(np.linalg.norm((Tg - g) / (1.0 if self._scale is None else self._scale)))
 
     @property
     def _fields(self) -> list[tuple[float, float]]:
@@ -165,6 +176,9 @@ class Coupling:
         self._seen.append((g, _vector("Tg", Tg, len(g)), self._anew))
         if self.kind.parallel and len(g) % 2:
             raise ValueError(f"g has {len(g)} numbers: needed both fields, of one length, as the coupling is parallel")
+        sizes = [r for r, _ in self._fields]
+        if self.kind.parallel and self._scale is None and all(sizes):
+            self._scale = np.repeat(sizes, len(g) // 2)
         if len(self._seen) > REMEMBERED:
             left = FIRST_ONES if self.kind.linear else 0
             begins = self._seen.pop(left)[2]
@@ -376,12 +390,14 @@ def couple(
         g, before = np.split(x, 2) if parallel else (x, None)
         displacement = _answer("neumann", neumann, g, len(seen) + 1)
         force = _answer("contact", contact, displacement if before is None else before, len(seen) + 1)
+        if seen and max(np.abs(force).max(), np.abs(displacement).max()) > FAR_AWAY:
+            raise _RunAway
         return np.concatenate([force, displacement]) if parallel else force
 
     def ended(found: Evaluation) -> Outcome | None:
         coupling.see(found.g, found.image)
         history.append(coupling.residual)
-        outcome = ending.at(found.residual, math.inf)
+        outcome = ending.at(coupling.size, math.inf)
         if coupling.arrived:
             outcome = Outcome.CONVERGED
         if listen is not None:
@@ -395,7 +411,10 @@ def couple(
     begin = np.concatenate([g, 0 * g]) if parallel else g
     if twice:
         coupling.see(begin, T(begin))
-    outcome = follow(evaluations(T, coupling.relaxed, begin), ended, seen)
+    try:
+        outcome = follow(evaluations(T, coupling.relaxed, begin), ended, seen)
+    except _RunAway:
+        outcome = Outcome.DIVERGED
     return Coupled(
         outcome=outcome,
         iterations=len(seen) + twice,

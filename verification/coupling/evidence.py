@@ -115,7 +115,9 @@ class Evidence(Part, ABC):
         if theta is None:
             theta = self.chosen(role)[0] if self.kind.parallel else role.advised(tied=tied and role.ends is not None)[0]
         spectrum, theta = spectrum.parallel() if self.kind.parallel else spectrum, min(theta, float(self.kind.most))
-        return methods.rows(spectrum, theta=theta, neumann_body=role.neumann_body, **settings)
+        rows = methods.rows(spectrum, theta=theta, neumann_body=role.neumann_body, **settings)
+        # modes that turn lead Aitken's factor astray: runs were seen not to arrive where their steps are predicted
+        return tuple(row for row in rows if not (self.kind.parallel and row.method == "aitken"))
 
     def on_estimates(self, spectrum: Spectrum, of: str) -> tuple[MethodRow, ...]:
         """The methods on an estimated spectrum, in which open nodes are already, and with the roles exchanged."""

@@ -62,6 +62,9 @@ UNNAMED = (
     "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
 )
 
+#: The reason for the run after one of parallel coupling that does not converge.
+STAYS = "a quarter of {}, which does not converge; the log of that run narrows rho, if it has absolute residuals"
+
 #: What windows show that are too short one by one.
 WINDOWS = "windows show no ratio one by one; their second halves have a ratio of {} together"
 
@@ -225,11 +228,13 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
         notes=log.notes,
     )
     ratio, plateau, rho = bare.slowest, bare.plateau, None
+    readings: tuple[RunReading, ...]
     grows = ratio is not None and ratio.least > 1
     if not kind.signed:
         return bare if ratio is None else replace(bare, readings=general.readings_of(theta, ratio))
-    if kind.parallel and (ratio is not None or bare.stays):
-        ratio = Observed.known(Fraction(1)) if ratio is None else ratio
+    if kind.parallel and bare.stays:
+        readings, following = (level(theta),), NextRun(theta=rounded_down(theta / 4), why=STAYS.format(few(theta)))
+    elif kind.parallel and ratio is not None:
         readings, following, rho = read_parallel(theta, ratio, linear=kind.linear)
     elif ratio is not None and grows:
         readings, following, _ = read_observed(theta, ratio)

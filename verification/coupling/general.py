@@ -21,7 +21,7 @@ from verification.coupling.spectrum import Spectrum
 RISES = 0.1
 
 #: A run to make has at most so many times the largest theta that falls: where it diverges it shows the largest lambda.
-FURTHER = 4.0
+FURTHER = 2.0
 
 
 def readings_of(theta: Fraction, ratio: Observed) -> tuple[RunReading, ...]:

@@ -29,6 +29,9 @@ MOST_BYTES = 500_000_000
 #: 2 s for ten million characters.
 SECONDS, SECONDS_PER_CHARACTER = 10, 1e-6
 
+#: The largest decimal logarithm of a residual.
+HIGHEST = 30
+
 #: So many lines at both ends of a log show how many digits its numbers have.
 LOOKED_AT = 200
 
@@ -162,6 +165,13 @@ def _number(word: str) -> float:
         return float(plain.replace("d", "e"))
 
 
+def _power(path: Path, value: float) -> float:
+    """The number of a decimal logarithm."""
+    if value > HIGHEST:
+        raise _refused(path, f"needed decimal logarithms (--log10), received {value:g}")
+    return float(10.0**value)
+
+
 def _rounding(words: Sequence[str]) -> dict[str, float]:
     """Rounding of numbers as they are written, in the attributes of :class:`Column`.
 
@@ -251,7 +261,7 @@ class _Lines:
             self.field = found["field"].strip()
         if self.waits and (word := found.get("residual")):
             value = self._value(line, word)
-            value, self.waits = 10.0**value if self.log10 else value, not self.once
+            value, self.waits = _power(self.path, value) if self.log10 else value, not self.once
             if value < 0:
                 raise _refused(self.path, "needed a residual >= 0", line, word)
             if self.field not in self.fresh:
@@ -379,7 +389,7 @@ class _LogTable:
         words = list(zip(*(self._split(self.lines[line - 1]) for line in ends), strict=True))
         columns = []
         if self.log10:
-            data[:, residuals] = 10.0 ** data[:, residuals]
+            data[:, residuals] = np.vectorize(lambda value: _power(self.path, value))(data[:, residuals])
         for i in residuals:
             wrong = np.flatnonzero(data[:, i] < 0)
             if wrong.size:

@@ -184,13 +184,17 @@ class Vectors(Evidence, Value):
         """Why eigenvalues below 0 leave no theta; empty where there are none of these."""
         if self.no_map:
             return ""
+        least = float(self.ritz.real.min())
         if self.kind.signed and self.ritz.real.max() < -REAL:
             return f"all eigenvalues are negative: {WRONG_SIGN}"
+        said = f"an eigenvalue seems to be {least:.3g}"
+        said += ": with -1 or less no theta above 0 converges" * (least <= RANK - 1)
+        below_0 = self.kind.linear and least < -max(REAL * (1 + abs(self.spectrum.high)), self.error_low)
+        if self.kind.signed and (least <= RANK - 1 or below_0):
+            return f"{said}; solvers with noise or a memory make such ones, or {WRONG_SIGN}"
         if self.kind.parallel and not self.spectrum.parallel().theta:
             return "with both solvers at once no theta above 0 converges: run one after the other"
-        if self.ritz.real.min() <= RANK - 1:
-            return f"an eigenvalue is {self.ritz.real.min():.3g}: with -1 or less no theta above 0 converges"
-        return ""
+        return said if least <= RANK - 1 else ""
 
 
 def seen_in(X: Floats, TX: Floats, *, kind: Kind = CONTACT, starts: NDArray[np.bool_] | None = None) -> Vectors:

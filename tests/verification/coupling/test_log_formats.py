@@ -113,6 +113,8 @@ def test_logarithms_are_taken_back_where_that_is_asked_for(tmp_path):
         np.testing.assert_allclose(found.columns[0].windows[0], WINDOWS[0], rtol=1e-10)
     with pytest.raises(ProblemError, match="residual >= 0"):
         read_log(columns)
+    with pytest.raises(ProblemError, match="needed decimal logarithms"):
+        read_log(written(tmp_path / "c.txt", "residual\n80.0\n64.0\n"), log10=True)
 
 
 @pytest.mark.parametrize(("name", "line", "accelerator"), [

@@ -50,6 +50,17 @@ def test_a_solver_with_a_memory_is_told_and_gets_no_theta():
     assert "no theta above 0" not in advice.why_no_theta
 
 
+def test_noise_that_makes_an_eigenvalue_below_0_is_named_as_a_cause():
+    random = np.random.default_rng(1)
+    noisy = lambda v: v * (1 + 1e-6 * random.normal(size=60))
+    values = np.geomspace(1, 60, 60)
+    found = vf.couple(
+        lambda p: noisy(p + 1.0), lambda d: noisy(1 - values * d), start=np.ones(60), kind="tied", parallel=True
+    )
+    assert found.advice.theta is None or found.advice.theta * 61 < 2
+    assert found.advice.theta is not None or "noise" in found.advice.why_no_theta
+
+
 def test_vectors_without_a_pair_ask_for_one():
     X, TX = Linear([0.5, 2.0]).run("aitken", 0.3, 5)
     one = vf.advise_vectors(X, TX)
