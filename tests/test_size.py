@@ -24,7 +24,7 @@ BUDGET = {
     "verification.cli": 2800,
     "verification.constants": 1050,
     "verification.contact": 1100,
-    "verification.coupling": 8600,
+    "verification.coupling": 8700,
     "verification.exploration": 850,
     "verification.figures": 1800,
     "verification.free_norm": 1750,

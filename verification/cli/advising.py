@@ -507,6 +507,9 @@ def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | Non
     from verification.document import Document
 
     if snippets is not None and found.theta is not None:
+        if found.theta > 1:
+            needed = f"received --snippets where theta = {found.theta:g}: the libraries take at most 1"
+            raise click.UsageError(needed, click.get_current_context())
         deliver(found, lambda found: blocks(found, snippets), as_json)
         if found.advised_exchanged:
             complain(f"the roles are as they are: {found.advised_exchanged}")

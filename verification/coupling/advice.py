@@ -331,6 +331,8 @@ class Advice(Document):
             raise ValueError(self.why_no_theta)
         if self.problem is not None and self.problem.several:
             raise self.problem.refuse("contact", None, "the blocks couple two solvers: needed a file with two bodies")
+        if self.theta > 1:
+            raise ValueError(f"theta = {self.theta:g}: needed at most 1 for the blocks, as the libraries take no more")
         if self.evidence.kind.parallel:
             raise ValueError("the blocks are for serial coupling: needed advice without parallel")
         if method is None:

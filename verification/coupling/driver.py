@@ -168,14 +168,16 @@ class Coupling:
     @property
     def arrived(self) -> bool:
         """True if the last evaluation is within the tolerance, each field of parallel coupling by itself."""
-        return all(r <= max(self.tolerance * size, self.absolute) < math.inf for r, size in self._fields)
+        absolute = (self.absolute, 0.0)  # in the unit of the force
+        fields = zip(self._fields, absolute, strict=False)
+        return all(r <= max(self.tolerance * size, least) < math.inf for (r, size), least in fields)
 
     def see(self, g: Any, Tg: Any) -> None:
         """Take in an evaluation without asking for the next force; parameters and errors as for :meth:`next`."""
         g = _vector("g", g, len(self._seen[-1][0]) if self._seen else None)
-        self._seen.append((g, _vector("Tg", Tg, len(g)), self._anew))
         if self.kind.parallel and len(g) % 2:
             raise ValueError(f"g has {len(g)} numbers: needed both fields, of one length, as the coupling is parallel")
+        self._seen.append((g, _vector("Tg", Tg, len(g)), self._anew))
         sizes = [r for r, _ in self._fields]
         if self.kind.parallel and self._scale is None and all(sizes):
             self._scale = np.repeat(sizes, len(g) // 2)

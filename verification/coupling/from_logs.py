@@ -62,6 +62,9 @@ UNNAMED = (
     "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
 )
 
+#: A pooled ratio is beyond that of open nodes by this share of theta.
+BEYOND = Fraction(1, 20)
+
 #: The reason for the run after one of parallel coupling that does not converge.
 STAYS = "a quarter of {}, which does not converge; the log of that run narrows rho, if it has absolute residuals"
 
@@ -216,7 +219,7 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
     if log.theta is not None and abs(log.theta - float(theta)) > off * (1 + 1e-9):
         named = f"the log names a relaxation factor of {log.theta:g}: needed the same theta, received {float(theta):g}"
         raise ProblemError(str(log.path), "", None, named)
-    columns = tuple(seen_column(column, theta) for column in log.columns)
+    columns = tuple(seen_column(column, theta, parallel=kind.parallel) for column in log.columns)
     bare = SeenLog(
         file=str(log.path),
         form=log.form,
@@ -259,20 +262,10 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
         if not bare.converges and all(reading.kind != "level" for reading in readings):
             readings, rho = (*readings, level(theta, bounds=False)), None
     else:
-        return bare if bare.pooled is None else of_windows(bare, bare.pooled, friction)
+        return bare if bare.pooled is None else replace(bare, next=of_pooled(theta, bare.pooled))
     if friction:
         readings, rho = readings_with_friction(readings), None
     return replace(bare, readings=readings, next=following, rho=rho)
-
-
-def of_windows(bare: SeenLog, ratio: Observed, friction: bool) -> SeenLog:
-    """A log whose windows show no ratio one by one: beyond ``1 - theta`` only the stiffest mode has their pace."""
-    following = of_pooled(bare.theta, ratio)
-    if friction or ratio.value <= 1 - bare.theta:
-        return replace(bare, next=following)
-    (reading, *_), best, _ = read_observed(bare.theta, Observed.known(ratio.value))
-    following = following if following.kept else replace(best, why=f"{WINDOWS.format(ratio)}: {best.why}")
-    return replace(bare, readings=(reading,), next=following)
 
 
 def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
@@ -280,7 +273,8 @@ def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
     why = WINDOWS.format(ratio)
     if ratio.most <= ends.SWIFT:
         return kept(theta, f"{why}, and none much faster is to be found")
-    following = read_observed(theta, ratio, converges=False)[1]
+    beyond = ratio.value > 1 - theta + BEYOND * theta  # then only the stiffest mode has this pace
+    following = read_observed(theta, Observed.known(ratio.value) if beyond else ratio, converges=False)[1]
     accelerated = "of an Aitken or IQN-ILS run this says nothing: give its vectors to ndtheory advise vectors"
     return replace(following, why=f"{why}: {following.why}; {accelerated}")
 

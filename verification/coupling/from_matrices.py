@@ -156,6 +156,8 @@ def advise_matrices(
     functions = isinstance(transfer, LinearOperator) or any(
         is_operator(S) or solve is not None for S, solve in given.values()
     )
+    if functions and not of.signed:
+        raise ValueError("kind general with an operator: needed S1 and S2 as matrices, or vectors of a run")
     if functions and friction is not None:
         raise ValueError("friction with an operator: needed S1, S2 and the transfer as matrices")
     if functions:

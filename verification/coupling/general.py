@@ -79,5 +79,5 @@ def decide(each: Sequence[Sequence[Box]], made: Sequence[Made]) -> tuple[NextRun
     if any(same_run(theta, one.theta) for one in made):
         best = min(falling or made, key=lambda one: (one.ratio is None, one.ratio or 0))
         return kept(best.theta, "no other theta is worth a run"), None
-    why = f"its ratio shows which reading is right: lambda is from {least - 1:.3g} to {most - 1:.3g} by the runs so far"
+    why = f"its ratio shows the other end: lambda is from {least - 1:.3g} to {most - 1:.3g} by the runs so far"
     return NextRun(theta=rounded_down(theta), why=why), None

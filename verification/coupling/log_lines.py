@@ -18,6 +18,9 @@ COLUMNS = ("preCICE", "columns")
 #: So many lines of a log are compared with those of known formats, and how much alike they must be.
 LOOKED_AT, ALIKE = 40, 0.7
 
+#: Characters of a line that are looked at.
+WIDEST = 300
+
 #: A number between blanks, and one after a word as programs name residuals.
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(?:[eE][-+]?\d+)?(?![\w.])")
 _RESIDUAL = re.compile(
@@ -120,7 +123,7 @@ def columns_of(names: Sequence[str]) -> ColumnsForm | None:
 
 def to_try(text: str) -> str:
     """The nearest known format, and a pattern to try, for a log that none fits; empty for a table of numbers."""
-    lines = [line for line in text.splitlines()[:LOOKED_AT] if line.strip()]
+    lines = [line[:WIDEST] for line in text.splitlines()[:LOOKED_AT] if line.strip()]
     if 2 * sum(bool(_NUMBER.match(line.split()[0])) for line in lines) > len(lines):
         return ""
     said, bare = [], [_NUMBER.sub("#", line) for line in lines]

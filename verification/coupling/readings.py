@@ -55,6 +55,9 @@ OF_OPEN_NODES = ("open", "level")
 #: A run shows nothing new if its theta and another one differ by less than this share, also of 1 - theta.
 ANEW = Fraction(1, 100)
 
+#: A ratio is surely below another one by this share of it.
+SURE = Fraction(1, 1000)
+
 #: Ratios this close to 1 - theta, as a share of theta and of 1 - theta, are those of open nodes.
 SAME = Fraction(1, 20)
 
@@ -281,8 +284,8 @@ def read_parallel(
     theta: Fraction, ratio: Observed, *, linear: bool
 ) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """The same for *parallel* coupling, where each mode turns and the stiffest one is always the slowest."""
-    least, rho, most = (rho_in_parallel(theta, r) for r in (ratio.least, ratio.value, ratio.most))
-    if most < -SAME:
+    least, rho = (rho_in_parallel(theta, r) for r in (ratio.least, ratio.value))
+    if ratio.most < (1 - SURE) * (1 - theta):
         why = f"no such coupling falls faster than {few(1 - theta)} a step at {few(theta)}: is it serial?"
         return (), NextRun(theta=rounded_down(theta / 2), why=f"half of it; {why}"), None
     least, rho = max(least, Fraction(0)), max(rho, Fraction(0))

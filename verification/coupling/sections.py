@@ -366,6 +366,8 @@ def paste(found: Advice, *more: str) -> Section:
     both = "Both fields are relaxed: the scheme is parallel, and names both as data of the acceleration."
     one = "For displacements (heat: temperatures) the same, but not in parallel coupling."
     said.append(both if found.coupling.parallel else one)
+    if found.theta is not None and found.theta > 1:
+        said.append("preCICE takes a factor of at most 1: there use IQN-ILS, or relax in the solvers.")
     return pasted_for(found, found.neumann_body, *said, *more)
 
 

@@ -41,7 +41,7 @@ AGREE = Fraction(103, 100)
 
 #: Assumption under which a ratio bounds rho from below, and from above.
 FROM_BELOW = "no friction, or a tied interface"
-FROM_FEW = f"{FROM_BELOW}, and ratios that have settled or still rise"
+FROM_FEW = f"{FROM_BELOW}, and a norm in which the coupling is symmetric, so that ratios only rise"
 TIED = "a tied interface"
 FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
 
@@ -84,8 +84,7 @@ class SeenColumn(Part):
     ratio: Observed | None = key(**_TOGETHER)
     plateau: Observed | None = key(**_TOGETHER)
     pooled: Observed | None = key(
-        "the ratio over the second halves of all windows, where none shows a ratio: beyond 1 - theta it bounds rho "
-        "from below, else nothing",
+        "the ratio over the second halves of all windows, where none shows a ratio: it bounds nothing",
         null="where windows are read one by one, or are fewer than five",
         why="windows are read one by one, or are too few or too short to be pooled",
         default=None,
@@ -127,7 +126,7 @@ class SeenColumn(Part):
         return found
 
 
-def seen_column(column: Column, theta: Fraction) -> SeenColumn:
+def seen_column(column: Column, theta: Fraction, *, parallel: bool = False) -> SeenColumn:
     """Read the windows of one field one by one and put them together; pool them where none shows a ratio."""
     windows = ([window for window in column.windows if len(window) > FEWEST_STEPS] or column.windows)[-MOST_WINDOWS:]
     paces = tuple(pace(window, column, theta) for window in windows)
@@ -138,7 +137,14 @@ def seen_column(column: Column, theta: Fraction) -> SeenColumn:
         residual=column.residual,
         paces=paces,
         windows=len(column.windows),
-        ratio=together([one for one in paces if one.kind != "plateau" and one.value is not None]),
+        # a field of parallel coupling grows where the other one falls
+        ratio=together(
+            [
+                one
+                for one in paces
+                if one.value is not None and one.kind not in ("plateau", "growth" if parallel else "")
+            ]
+        ),
         plateau=together([one for one in paces if one.kind == "plateau"]),
         pooled=pooled(windows, relative=relative, steps=steps) if short else None,
     )
@@ -338,9 +344,6 @@ def bounds(logs: Sequence[SeenLog], *, parallel: bool = False) -> tuple[list[Log
             says = f"its residual changes by {few(ratio.least)} a step or more, beyond 1 - theta"
             assumes = FROM_FEW if log.explodes else FROM_BELOW
             lower.append(LogBound(value=rho(ratio.least, theta), log=log, says=says, assumes=assumes))
-        elif ratio is None and log.pooled is not None and log.readings:
-            says = f"at the end of its windows the residual changes by {few(log.pooled.value)} a step, beyond 1 - theta"
-            lower.append(LogBound(value=rho(log.pooled.value, theta), log=log, says=says, assumes=FROM_FEW))
         if log.diverges:
             lower.append(LogBound(value=2 / theta - 1, log=log, says="it does not converge", assumes=FROM_BELOW))
         if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):

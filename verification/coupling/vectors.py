@@ -337,13 +337,13 @@ def _images(
     rest = sigma <= RANK * sigma[0]
     largest = float((sizes[~rest] / sigma[~rest]).max()) or 1.0
     noise = float(sizes[rest].max()) / largest if rest.any() else None
-    rounding = np.sqrt(((Vt * (max(taken.accuracy, loud) / lengths[kept])) ** 2).sum(axis=1)) / largest
+    rounding = np.sqrt(((Vt * (taken.accuracy / lengths[kept])) ** 2).sum(axis=1)) / largest
     used = ~rest & (sigma * CLEAN >= np.maximum(rounding, noise or 0.0))
     if not used.any():
         used = sigma == sigma[0]
     if again.any():
-        felt = np.sqrt(((Vt * (loud / lengths[kept])) ** 2).sum(axis=1)) / sigma / largest
-        noise = max(noise or 0.0, float(felt[used].max()))
+        felt = np.sqrt(((Vt[used] * (loud / lengths[kept])) ** 2).sum(axis=1)) / sigma[used] / largest
+        noise = max(noise or 0.0, float(felt.max()))
     return U[:, used], images[:, used] / sigma[used], noise
 
 

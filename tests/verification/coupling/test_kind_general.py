@@ -189,6 +189,12 @@ def test_kinds_that_do_not_go_together_are_refused(given, needed):
         vf.advise_run("0.5", "0.9", **given)
 
 
+def test_operators_of_this_kind_are_refused():
+    """Lanczos needs a symmetric coupling; a theta of eigenvalues cut off at 0 would diverge."""
+    with pytest.raises(ValueError, match="kind general with an operator"):
+        vf.advise_matrices(lambda u: -2 * u, solve2=lambda f: f, unknowns=5, kind="general")
+
+
 def test_moduli_say_nothing_of_this_kind():
     with pytest.raises(HypothesisError, match="moduli say nothing"):
         vf.advise_moduli(young=(1, 1), poisson=(0, 0), kind="general")

@@ -21,7 +21,7 @@ def test_a_log_that_explodes_bounds_rho_by_its_last_ratio(tmp_path, tied):
     found = vf.advise_logs([(log, "0.5")], tied=tied)
     assert found.interval.lo.value == pytest.approx(81, rel=1e-6)
     assert found.interval.lo.value <= 81
-    assert "settled or still rise" in found.interval.lo.assumes
+    assert "ratios only rise" in found.interval.lo.assumes
     assert found.next.theta == pytest.approx(2 / 83, rel=1e-3)
     assert not found.next.again
     assert kinds(found) == ["mode-high"] + ["level"] * (not tied)
@@ -59,7 +59,7 @@ def test_two_runs_that_explode_lead_below_the_larger_bound(tmp_path):
     assert found.next.theta == pytest.approx(2 / 111, rel=1e-3)
 
 
-def test_forty_windows_of_four_iterations_bound_rho(tmp_path):
+def test_forty_windows_of_four_iterations_lead_to_the_theta_for_rho(tmp_path):
     random, modes, theta = np.random.default_rng(0), np.geomspace(0.3, 6.52, 15), 0.25
     rows, solution = ["TimeWindow Iteration ResAbs(M:F)"], np.zeros(15)
     for window in range(1, 41):
@@ -68,8 +68,7 @@ def test_forty_windows_of_four_iterations_bound_rho(tmp_path):
             rows.append(f"{window} {iteration} {np.linalg.norm((1 + modes) * error):.8e}")
             error = (1 - theta * (1 + modes)) * error
     found = vf.advise_logs([(written(tmp_path / "a.log", "\n".join(rows) + "\n"), theta)], tied=True)
-    assert 0.9 * 6.52 < found.interval.lo.value <= 6.52
-    assert kinds(found) == ["mode-high"]
+    assert (found.interval.lo, found.readings) == (None, ())
     assert found.next.theta == pytest.approx(2 / 8.52, rel=0.05)
     with_friction = vf.advise_logs([(tmp_path / "a.log", theta)], friction=True)
     assert (with_friction.interval.lo, with_friction.readings) == (None, ())

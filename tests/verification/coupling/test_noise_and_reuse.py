@@ -35,6 +35,15 @@ def test_no_error_is_called_smaller_than_the_noise_of_the_solvers(noise):
     assert found.iterations == twice(lambda u: 1 - VALUES * (u - 1)).iterations == 13
 
 
+@pytest.mark.parametrize("noise", [1e-8, 1e-6])
+def test_little_noise_that_is_seen_takes_no_advice_away(noise):
+    random, values = np.random.default_rng(3), np.geomspace(0.1, 6, 12)
+    noisy = lambda u: (1 - values * (u - 1)) * (1 + noise * random.normal(size=12))
+    found = twice(noisy, rule="iqn-ils", max_iterations=20)
+    assert found.advice.theta is not None
+    assert abs(found.advice.spectrum.high - 6) <= found.advice.vectors.error_high + 1e-6
+
+
 def test_a_solver_with_a_memory_is_told_and_gets_no_theta():
     state = np.zeros(12)
 

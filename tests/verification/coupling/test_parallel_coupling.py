@@ -168,6 +168,21 @@ def test_a_relative_residual_that_stays_at_a_level_gives_no_theta_to_paste(tmp_p
     assert found.next.theta < theta
 
 
+def test_one_field_that_grows_while_the_other_one_falls_decides_nothing(tmp_path):
+    """theta = 0.1, lambda = 1: the run converges by 0.9055 a step."""
+    rows = {"ResAbs(M:F)": [1e-3, 0.101, 0.181], "ResAbs(M:U)": [1.0, 0.9, 0.8]}
+    found = vf.advise_logs([(precice(tmp_path / "a.log", [rows]), "0.1")], tied=True, parallel=True)
+    assert (found.theta, found.interval.lo, found.methods) == (None, None, ())
+
+
+def test_windows_of_open_nodes_bound_nothing(tmp_path):
+    """Their pace is 1 - theta, whatever rho is."""
+    for theta in (0.05, 0.35):
+        series = [{"ResAbs(M:F)": [round((1 - theta) ** n, 3) for n in range(5)]}] * 40
+        found = vf.advise_logs([(precice(tmp_path / "a.log", series), theta)])
+        assert (found.interval.lo, found.readings) == (None, ())
+
+
 # --- couple ----------------------------------------------------------------------------------------------------------
 
 
@@ -209,6 +224,14 @@ def test_numbers_beyond_all_measure_end_a_coupling_as_diverged():
     found = vf.couple(lambda g: g, contact, start=np.ones(3), rule="constant", theta=1, max_iterations=60)
     assert found.diverged
     assert found.iterations < 20
+
+
+def test_an_absolute_tolerance_is_one_of_the_force_alone():
+    """In its unit every displacement is small."""
+    small = {"neumann": lambda g: 1e-7 * (g + 10), "contact": lambda u: -1e7 * u, "start": np.zeros(3)}
+    found = vf.couple(**small, parallel=True, kind="tied", theta=0.4, absolute=0.1, max_iterations=200)
+    assert found.converged
+    assert found.force == pytest.approx(-5, abs=0.3)
 
 
 def test_each_solver_gets_what_the_other_answered_before():
