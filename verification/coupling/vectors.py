@@ -278,12 +278,14 @@ def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_], kind: Kind) -> tuple
     Differences of consecutive rows count where ``inside``.
     """
     accuracy, half = _accuracy(X, TX), X.shape[1] // 2
+    lost = np.zeros((1, 1))
     if kind.parallel:
         parts = slice(half), slice(half, None)
         one, other = (Field.of(X[:, of], TX[:, of], accuracy) for of in parts)
         images = [replace(field, rows=TX[:, of]) for field, of in zip((one, other), parts, strict=True)]
         U, there, noise = _images(one, images[1], inside)
         V, back, more = _images(other, images[0], inside)
+        lost = np.linalg.norm(back, 2) * (there - V @ (V.T @ there))  # what no image of the other field is known of
         A, noise = U - back @ (V.T @ there), max((each for each in (noise, more) if each is not None), default=None)
     else:
         field = Field.of(X, TX, accuracy)
@@ -296,6 +298,8 @@ def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_], kind: Kind) -> tuple
     order = np.argsort(values.real)
     values, vectors = values[order], vectors[:, order]
     residuals = np.linalg.norm(A @ vectors - (U @ vectors) * values, axis=0)
+    if kind.parallel:
+        residuals = residuals + np.linalg.norm(lost @ vectors, axis=0)
     return values, residuals, noise
 
 

@@ -120,6 +120,14 @@ def test_vectors_of_both_fields_show_the_eigenvalues_of_the_serial_coupling(unit
         vf.advise_vectors(np.eye(3), np.eye(3), parallel=True)
 
 
+def test_what_leaves_the_known_directions_of_the_other_field_is_an_error():
+    """Two iterates whose force has changed in one mode, and whose displacement in the other."""
+    values = np.array([0.3, 4.0])
+    X = np.array([[0.0, 0, 0, 0], [1.0, 0, 0, 1.0]])
+    TX = np.hstack([1 - values * X[:, 2:], X[:, :2]])
+    assert vf.advise_vectors(X, TX, tied=True, parallel=True).theta is None
+
+
 def test_images_that_do_not_follow_from_the_other_field_are_told():
     X = np.random.default_rng(0).normal(size=(9, 12))
     found = vf.advise_vectors(
