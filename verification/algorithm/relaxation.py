@@ -290,7 +290,7 @@ class InverseStep:
             # each as long as any other
             self.changes.append(((r - self.last[0]) / size, (image - self.last[1]) / size))
         self.last = r, image
-        known = [*reversed(self.changes), *filtered(self.changes, self.earlier)]
+        known = [*reversed(self.changes), *(filtered(self.changes, self.earlier) if self.earlier else ())]
         if not known:
             return g + self.theta * (image - g)
         V, W = (np.column_stack(columns) for columns in zip(*known, strict=True))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 from click.shell_completion import CompletionItem
@@ -17,7 +17,7 @@ from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import AdviseCommand, AdviseGroup, Default, cli
 from verification.cli.options import JSON, SET, SWAP, F, OneOf, Typed
 from verification.cli.problems import load_problem
-from verification.coupling.kinds import Kind, kind_of
+from verification.coupling.kinds import Kind, KindName, kind_of
 from verification.coupling.snippets import SNIPPETS
 from verification.show.layout import nothing_typed
 
@@ -87,7 +87,7 @@ def of_kind(command: Callable[..., None]) -> Callable[..., None]:
 
     @click.option(
         "--kind",
-        type=OneOf(["contact", "tied", "general"]),
+        type=OneOf(get_args(KindName)),
         help="Kind of coupling: general may have positive feedback; by default contact.",
     )
     @TIED

@@ -114,9 +114,18 @@ class Evidence(Part, ABC):
         spectrum = spectrum if tied else spectrum.with_open_nodes()
         if theta is None:
             theta = self.chosen(role)[0] if self.kind.parallel else role.advised(tied=tied and role.ends is not None)[0]
-        spectrum, theta = spectrum.parallel() if self.kind.parallel else spectrum, min(theta, float(self.kind.most))
-        rows = methods.rows(spectrum, theta=theta, neumann_body=role.neumann_body, **settings)
-        # modes that turn lead Aitken's factor astray: runs were seen not to arrive where their steps are predicted
+        return self.rows_on(spectrum, role.neumann_body, theta=min(theta, float(self.kind.most)), **settings)
+
+    def rows_on(
+        self, spectrum: Spectrum, neumann_body: BodyNumber | None, *, theta: float | None = None, **settings: bool
+    ) -> tuple[MethodRow, ...]:
+        """The methods on a spectrum of serial coupling, for a theta or the best one; in parallel on its square roots.
+
+        Modes that turn lead Aitken's factor astray: runs were seen not to arrive where their steps are predicted.
+        """
+        spectrum = spectrum.parallel() if self.kind.parallel else spectrum
+        theta = spectrum.theta if theta is None else theta
+        rows = methods.rows(spectrum, theta=theta, neumann_body=neumann_body, **{"exchanged": False} | settings)
         return tuple(row for row in rows if not (self.kind.parallel and row.method == "aitken"))
 
     def on_estimates(self, spectrum: Spectrum, of: str) -> tuple[MethodRow, ...]:

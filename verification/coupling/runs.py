@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar
 
-from ndtheory.energy_norms import parallel_theta, predicted_theta
 from ndtheory.keys import key, says
 from ndtheory.number import below
-from verification.coupling import methods
 from verification.coupling.accelerated import Accelerated
 from verification.coupling.evidence import Evidence
 from verification.coupling.kinds import Kind
@@ -76,13 +74,7 @@ class Runs(Evidence):
         if self.spectrum is not None:
             return self.on_estimates(self.spectrum, self.shows)
         if not roles and (rho := self.least_rho or 0.0) > LARGE and not self.rubs:
-            few_modes = Spectrum.between(0.0, rho)
-            theta = parallel_theta(rho) if self.kind.parallel else predicted_theta(rho)
-            few_modes = few_modes.parallel() if self.kind.parallel else few_modes
-            return tuple(
-                replace(row, bound="at least")
-                for row in methods.rows(few_modes, theta=theta, neumann_body=None, exchanged=False)
-            )
+            return tuple(replace(row, bound="at least") for row in self.rows_on(Spectrum.between(0.0, rho), None))
         if self.kind.parallel:
             return super().methods(roles)
         each = (self.in_role(role, theta=self.next.theta, exchanged=False, one_end=True) for role in roles)

@@ -12,7 +12,6 @@ from ndtheory import HypothesisError, Number
 from ndtheory.constants import take
 from ndtheory.keys import key, says
 from ndtheory.moduli import Wall, added_mass, conduction, cooled
-from verification.coupling import methods
 from verification.coupling.evidence import Evidence
 from verification.coupling.kinds import BodyNumber, Kind
 from verification.coupling.methods import MethodRow
@@ -183,8 +182,7 @@ class Fluid(Waves):
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
         """On the waves, for the best theta of these."""
-        spectrum = Spectrum.of(self.values).parallel() if self.kind.parallel else Spectrum.of(self.values)
-        return methods.rows(spectrum, theta=spectrum.theta, neumann_body=2, exchanged=False)
+        return self.rows_on(Spectrum.of(self.values), 2)
 
     def next_run(self) -> NextRun:
         """A run to begin with."""
