@@ -31,7 +31,7 @@ DEPTH = 10
 #: Number of earlier steps that IQN-ILS uses.
 REMEMBERED = 40
 
-#: A change of an earlier step in time counts if this share of it is no combination of newer ones.
+#: A change of an earlier step in time counts if this share of it is independent of newer ones.
 FILTER = 1e-2
 
 #: Columns of the least-squares problem of Anderson mixing are dropped below this share of the largest.

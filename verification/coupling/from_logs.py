@@ -62,7 +62,7 @@ UNNAMED = (
     "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
 )
 
-#: A pooled ratio is beyond that of open nodes by this share of theta.
+#: A pooled ratio exceeds 1 - theta, the pace of open nodes, by this share of theta.
 BEYOND = Fraction(1, 20)
 
 #: The reason for the run after one of parallel coupling that does not converge.

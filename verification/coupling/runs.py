@@ -70,7 +70,7 @@ class Runs(Evidence):
         return (role_of(None, self.rho, nothing="an observed ratio proves nothing", reason=OF_ONE_RUN),)
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
-        """For the theta to paste; on the spectrum, with the roles exchanged too, or where rho alone is known."""
+        """For the theta to paste; on the spectrum, with the roles exchanged too, or by rho where only that is known."""
         if self.spectrum is not None:
             return self.on_estimates(self.spectrum, self.shows)
         if not roles and (rho := self.least_rho or 0.0) > LARGE and not self.rubs:

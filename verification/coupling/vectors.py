@@ -171,7 +171,7 @@ class Vectors(Evidence, Value):
 
     @property
     def no_map(self) -> str:
-        """Why T is no map of these vectors; empty where it may be one."""
+        """The reason why these vectors do not belong to one map T; empty where they may."""
         if (self.apart or 0.0) > LOUD:
             share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
             return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
@@ -324,7 +324,7 @@ def _images(
 ) -> tuple[Floats, Floats, float | None]:
     """An orthonormal basis of the differences of some rows, what a linear map to others makes of it, and its noise.
 
-    Where the others do not differ ``still`` says what that means; empty where it is no error.
+    ``still`` is the error where the others do not differ; empty where they may be the same.
     """
     D, E = (np.diff(field.rows, axis=0)[inside].T / field.unit for field in (given, taken))
     lengths = np.linalg.norm(D, axis=0)
