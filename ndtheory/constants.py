@@ -32,9 +32,7 @@ def take(key: str, value: Numeric, needed: str, holds: Callable[[Fraction], bool
         if holds(number):
             return number
     except UnusualSize as error:
-        needed = (
-            needed if not holds(error.near) or "1e-" in needed else f"{needed}, {OF_SIZE}"
-        )  # which may say so already
+        needed = f"{needed}, {OF_SIZE}" if holds(error.near) else needed
     except ValueError:
         pass
     raise HypothesisError(key, value, needed)

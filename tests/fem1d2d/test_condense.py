@@ -21,6 +21,7 @@ from fem1d2d import (
     elimination_order,
     gram,
     interval,
+    plane_strain,
     rectangle,
     solver,
     solver_with_inertia,
@@ -329,6 +330,28 @@ def test_scaling_the_matrix_scales_the_energy_and_keeps_the_lift(kind, case, c):
     one, other = kind(matrix, interface), kind((matrix * float(c)).tocsc(), interface)
     assert np.array_equal(other.lift, one.lift)
     assert np.array_equal(other.schur, one.schur * float(c))
+
+
+@pytest.mark.parametrize("power", [-300, -40, 40, 300])
+def test_a_body_that_nothing_holds_is_condensed_alike_in_every_unit(power):
+    """What is added on the way scales with the matrix, whose entries far from each other include zeros."""
+    mesh = rectangle((0.0, 4.0), (0.0, 1.0), (8, 2))
+    matrix, c = stiffness(mesh, plane_strain(1.0, 0.25)).tocsc(), 2.0**power
+    assert 0 in np.abs(matrix.data)
+    interface = np.arange(0, 12)
+    one, other = (Condensation((matrix * unit).tocsc(), interface, singular=True) for unit in (1.0, c))
+    assert np.array_equal(other.schur, one.schur * c)
+    forms = [gram(mesh).tocsc() * unit for unit in (1.0, c)]
+    assert np.array_equal(other.on_lifts(forms[0]), one.on_lifts(forms[0]))
+    assert np.array_equal(one.on_lifts(forms[1]), one.on_lifts(forms[0]) * c)
+
+
+def test_a_body_without_an_interface_answers_with_nothing_there():
+    matrix = sp.csc_array(np.array([[2.0, -1.0], [-1.0, 2.0]]))
+    found = Condensation(matrix, np.array([], dtype=int)).response(np.array([1.0, 1.0]))
+    assert found.flexibility.shape == (0, 0)
+    assert found.loaded == pytest.approx([1.0, 1.0])
+    assert found.field(np.array([])).tolist() == [0.0, 0.0]
 
 
 @either

@@ -152,6 +152,15 @@ def test_tolerances_along_a_line_are_those_of_the_line_not_of_the_body():
     assert seen.s == pytest.approx([0.0, 0.5e-8, 1e-8], rel=1e-12)
 
 
+def test_of_two_edges_above_a_node_the_nearer_one_there_is_met():
+    """The farther one begins lower: what counts is where the normal meets it."""
+    flat = Line(nodes=np.arange(2), points=np.array([[1.0, 0.0], [1.2, 0.0]]), normals=np.tile([0.0, 1.0], (2, 1)))
+    straight = [[x, 0.9 + x / 10] for x in (-1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0)]
+    folded = np.array([[0.0, 0.1], [2.0, 3.0], [-1.1, 3.0], *straight])
+    other = Line(nodes=np.arange(10), points=folded, normals=np.tile([0.0, -1.0], (10, 1)))
+    assert flat.seen_from(other).gap == pytest.approx([1.0, 1.02])
+
+
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_normals_that_cross_before_they_meet_the_other_line_are_refused_whatever_the_size(size):
     """Half as steep as those of a hollow arc, they meet near a diameter above it: a line beyond would be reversed."""

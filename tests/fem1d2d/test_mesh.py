@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from strategies import fewer, in_floats, lines, meshes, numbers, plane_meshes, renumbered
 
 from fem1d2d import Mesh, MeshError, interval, rectangle, sector
-from fem1d2d.mesh import LARGEST, measures
+from fem1d2d.mesh import LARGEST, crossed, measures
 
 sizes = numbers(Fraction(1, 4), 3, 12)
 counts = st.integers(1, 5)
@@ -279,6 +279,29 @@ def test_the_largest_coordinate_is_taken_and_the_double_beyond_it_is_refused():
 def test_an_interval_too_short_for_its_floats_is_refused():
     with pytest.raises(MeshError, match="no positive length"):
         interval((1.0, float(np.nextafter(1.0, 2.0))), 3)
+
+
+def by_both_diagonals(nx, ny):
+    grid = rectangle((0.0, float(nx)), (0.0, float(ny)), (nx, ny)).points
+    node = lambda i, j: i * (ny + 1) + j
+    cells, middles = [], []
+    for i in range(nx):
+        for j in range(ny):
+            around = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)]
+            cells += [[a, b, len(grid) + len(middles)] for a, b in pairwise([*around, around[0]])]
+            middles.append(grid[around].mean(axis=0))
+    return Mesh(points=np.vstack([grid, middles]), cells=np.array(cells), sides={})
+
+
+@pytest.mark.parametrize(("nx", "ny"), [(1, 1), (3, 2), (4, 4)])
+def test_quadrilaterals_split_by_both_diagonals_are_told_from_any_other_mesh(nx, ny):
+    whole = by_both_diagonals(nx, ny)
+    assert crossed(whole)
+    assert not crossed(rectangle((0.0, 1.0), (0.0, 1.0), (nx, ny)))
+    assert not crossed(interval((0.0, 1.0), nx))
+    beside = rectangle((nx + 1.0, nx + 2.0), (0.0, 1.0), (2, 1))
+    cells = np.vstack([whole.cells, beside.cells + len(whole.points)])
+    assert not crossed(Mesh(points=np.vstack([whole.points, beside.points]), cells=cells, sides={}))
 
 
 @fewer(3, at_night=1)

@@ -218,6 +218,14 @@ def test_a_largest_eigenvalue_of_high_multiplicity_is_found_also_when_rounding_s
     assert largest((A + A.T) / 2, B).value == pytest.approx(1.5, rel=n * 16 * EPS)
 
 
+@pytest.mark.parametrize("n", [10, 30])
+def test_a_pencil_all_of_whose_eigenvalues_are_one_has_that_one(n):
+    """A subset that LAPACK is asked for may be empty then, which some of these rotations of the identity show."""
+    for seed in range(100):
+        Q = np.linalg.qr(np.random.default_rng(seed).standard_normal((n, n)))[0]
+        assert largest(Q @ Q.T, np.eye(n)).value == pytest.approx(1.0, rel=n * 16 * EPS)
+
+
 # --- from products and solves alone -----------------------------------------------------------------------------------
 
 

@@ -11,6 +11,7 @@ from strategies import fewer, in_floats, lines, plane_meshes
 
 import fem1d2d
 from fem1d2d import Material, Mesh, MeshError, interval, rectangle, stiffness, supports
+from fem1d2d.supports import pieces
 
 LAW = Material(lame_lambda=Fraction(1), lame_mu=Fraction(1))
 SQUARE = rectangle((0.0, 1.0), (0.0, 1.0), (2, 2))
@@ -215,6 +216,14 @@ HINGED = Mesh(
     cells=np.array([[0, 1, 2], [0, 3, 4]]),
     sides={},
 )
+
+
+def test_cells_are_one_piece_where_they_share_a_facet_and_hinged_ones_also_where_they_share_a_node():
+    assert pieces(HINGED).tolist() == [0, 1]
+    assert pieces(HINGED, hinged=True).tolist() == [0, 0]
+    for hinged in (False, True):
+        assert not pieces(SQUARE, hinged=hinged).any()
+        assert not pieces(interval((0.0, 1.0), 4), hinged=hinged).any()
 
 
 @given(st.one_of(held_meshes(), broken_meshes()))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import verification as vf
 from verification.algorithm.arrival import MOST, TOLERANCES, arrived, coupled_residual
-from verification.algorithm.loop import Ending
+from verification.algorithm.loop import Ending, Outcome
 from verification.algorithm.rates import noise
 from verification.algorithm.start import tied_force
 
@@ -76,19 +76,10 @@ def test_bodies_that_the_first_step_throws_apart_have_not_arrived():
     assert run.to_dict()["coupled_residual"] == run.coupled_residual
 
 
-@given(data=strategies.contact_problems(), step=st.integers(0, 6))
-@strategies.fewer(2)
-def test_the_coupled_residual_is_that_of_each_condition_at_each_node(data, step):
-    """Worked out again node by node, with inverses of matrices."""
-    pair = vf.build(vf.Problem.from_dict(data))
-    iterate = next(state for state in vf.iterate(pair) if state.iteration == step)
-    found = coupled_residual(pair, iterate)
+def violated(pair, iterate):
+    """The largest violation of a condition over the size of g, node by node."""
     flexibility = np.linalg.inv(pair.neumann.schur)
     norm = lambda force: np.sqrt(max(force @ flexibility @ force, 0.0))
-    nothing = max(2 * pair.settings.tolerance * iterate.scale, noise(pair, iterate))  # a force of rounding, too
-    if norm(iterate.g) <= nothing:  # there is no force as yet
-        assert found is None or norm(iterate.g) > 0
-        return
     t, n = pair.contact.grid.t, pair.contact.grid.n
     P = pair.interface.transfer
     weights = pair.contact.grid.weights, pair.neumann.grid.weights
@@ -105,8 +96,34 @@ def test_the_coupled_residual_is_that_of_each_condition_at_each_node(data, step)
         if t and abs(traction[j]) > bound[j]:
             parts["rubs"][j] = traction[j] - np.sign(traction[j]) * bound[j]
     back = lambda force: np.concatenate([P.T @ force[i : i + n] for i in range(0, t + n, n)])
-    wanted = max([norm(off), *(norm(back(part)) for part in parts.values())]) / norm(iterate.g)
-    assert found == pytest.approx(wanted, rel=1e-6, abs=1e-9)
+    return max([norm(off), *(norm(back(part)) for part in parts.values())]) / norm(iterate.g)
+
+
+@given(data=strategies.contact_problems(), step=st.integers(0, 6))
+@strategies.fewer(2)
+def test_the_coupled_residual_is_that_of_each_condition_at_each_node(data, step):
+    """Worked out again node by node, with inverses of matrices."""
+    pair = vf.build(vf.Problem.from_dict(data))
+    iterate = next(state for state in vf.iterate(pair) if state.iteration == step)
+    found = coupled_residual(pair, iterate)
+    nothing = max(2 * pair.settings.tolerance * iterate.scale, noise(pair, iterate))  # a force of rounding, too
+    if pair.neumann.dual_norm(iterate.g) <= nothing:  # there is no force as yet
+        assert found is None or pair.neumann.dual_norm(iterate.g) > 0
+    else:
+        assert found == pytest.approx(violated(pair, iterate), rel=1e-6, abs=1e-9)
+
+
+def test_a_violation_of_one_condition_may_exceed_the_change_of_the_force():
+    """Forces of alternating sign are short in (5.21), and those of them that violate one condition are not."""
+    pair = vf.build(vf.example("section6"))
+    last, normal = vf.run(pair).last, pair.neumann.grid.normal
+    for size in (1.0, 10.0):
+        off = np.zeros(len(last.g))
+        off[normal] = size * np.abs(last.g).max() * (-1.0) ** np.arange(pair.neumann.grid.n)
+        rough = replace(last, g=last.g + off)
+        found = coupled_residual(pair, rough)
+        assert found == pytest.approx(violated(pair, rough), rel=1e-6)
+    assert found > 1.1 * pair.neumann.dual_norm(off) / pair.neumann.dual_norm(rough.g)
 
 
 def test_the_residual_of_a_small_force_beside_large_loads_keeps_its_digits():
@@ -169,6 +186,14 @@ def test_a_state_has_arrived_within_a_tenth_or_ten_times_the_tolerance_whichever
         assert arrived(asked, iterate) == (share < 1)
 
 
+@pytest.mark.parametrize("share", [0.3, 3.0])
+def test_a_violation_or_a_force_within_the_tolerance_beside_the_scale_is_none(share):
+    pair, iterate = violating("a node pulls", share)
+    size = min(share, 1.0) * pair.neumann.dual_norm(iterate.g)
+    for part, there in ((1.01, True), (0.99, False)):
+        assert arrived(pair, replace(iterate, scale=part * size / pair.settings.tolerance)) is there
+
+
 def test_a_state_that_fails_does_not_end_a_run():
     assert Ending(1e-2, 500).at(1e-3, 1.0) == "converged"
     assert Ending(1e-2, 500).at(1e-3, 1.0, lambda: False) is None
@@ -176,6 +201,23 @@ def test_a_state_that_fails_does_not_end_a_run():
     outcomes = [ending.at(1e-3, 1.0, lambda: False) for _ in range(60)]
     assert "stalled" in outcomes
     assert Ending(1e-2, 500).at(1.0, np.inf) is None
+
+
+@pytest.mark.parametrize("growing", [0, 1, 3])
+def test_an_iteration_has_diverged_where_its_residual_is_large_and_has_grown_so_often(growing):
+    ending = Ending(1e-9, 500, runaway=10.0, growing=growing)
+    assert [ending.at(residual, 1.0) for residual in (1.0, 0.9, 0.5)] == [None, None, None]
+    outcomes = [ending.at(residual, 1.0) for residual in (20.0, 21.0, 22.0)]
+    assert outcomes.index(Outcome.DIVERGED) == max(growing - 1, 0)
+    falls = Ending(1e-9, 500, runaway=10.0, growing=2)
+    assert [falls.at(residual, 1.0) for residual in (1.0, 30.0, 25.0, 26.0, 24.0)] == [None] * 5
+
+
+def test_the_values_of_an_iteration_that_did_not_converge_are_headed_as_such():
+    for outcome in Outcome:
+        assert bool(outcome.unfinished) is (outcome != "converged")
+    assert (Outcome.LIMIT.words, Outcome.LIMIT.seen) == ("not converged", "still falling when stopped")
+    assert (Outcome.INTERRUPTED.words, Outcome.INTERRUPTED.seen) == ("interrupted", "interrupted")
 
 
 # --- starts -----------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from sample_runs import by_name
 
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.linearisation import NotLinear, linearise
 from verification.interface.pair import pair_from
 
@@ -70,6 +71,44 @@ def test_no_friction_acts_where_the_contact_body_is_held():
     assert piece.pattern.sliding[0] == 0
     assert not piece.force[0].any()
     assert not piece.jump[0].any()
+
+
+def test_a_held_node_of_the_contact_body_is_where_its_support_holds_it_and_carries_no_shear():
+    pair = held(neumann=False)
+    slipped = np.linspace(3e-3, 0, pair.contact.grid.t)
+    pair = replace(pair, interface=replace(pair.interface, slipped=slipped))  # after an increment
+    u, contact = FixedPointMap(pair)(along_a_run(pair, 4))
+    (held_row,) = np.flatnonzero(~pair.contact.free)
+    trace = pair.interface.carry(u) + pair.offset + contact.v
+    assert abs(pair.offset[held_row]) == slipped[held_row] > 0
+    assert trace[held_row] == pytest.approx(pair.contact.known[held_row], abs=1e-15)
+    assert contact.force[held_row] == 0
+    assert contact.pattern.sliding[held_row] == 0
+
+
+def test_the_scale_of_a_state_is_the_larger_size_of_a_force_and_of_its_image():
+    pair = held(neumann=True)
+    g = 1e-9 * along_a_run(pair, 4)
+    norm = pair.neumann.dual_norm
+    for least in ({}, {"least": 0.0}, {"least": 1e3}):
+        state = iterate_at(FixedPointMap(pair), g, **least)
+        wanted = max(norm(state.g), norm(state.image), least.get("least", 0.0))
+        assert state.scale == pytest.approx(wanted, rel=1e-9)
+    weak = pair_from(vf.Problem.from_dict(bars(body2={"prescribed": {"right": "-1e-9"}})))
+    state = iterate_at(FixedPointMap(weak), np.zeros(1))
+    assert state.scale == pytest.approx(weak.neumann.dual_norm(state.image))
+    assert 0 < state.scale < 1e-3
+
+
+def test_nodes_on_which_contact_forces_act_are_never_still():
+    """Their normal force may pass 0; open nodes out of reach keep theirs."""
+    pair = pair_from(vf.Problem.from_dict(PROBLEMS["sheared until it slips"]))
+    g = along_a_run(pair, 5)
+    pattern = step_II(pair, g).pattern
+    zero = np.zeros(len(g))
+    touching = np.ones_like(pattern.touching)
+    assert not piece_of(pair, zero, replace(pattern, touching=touching)).still.any()
+    assert piece_of(pair, zero, replace(pattern, touching=~touching)).still.all()
 
 
 def test_a_force_on_a_held_node_of_the_neumann_body_moves_nothing():

@@ -354,6 +354,31 @@ def test_the_theorem_is_about_a_constant_theta_and_about_momentum_without_fricti
         assert (rule.outside(Fraction(0)) == "") == (relaxation in ("constant", "momentum"))
 
 
+def test_a_run_by_momentum_has_a_proved_rate_without_friction_only():
+    problem = vf.example("section6").with_keys({"iteration.relaxation": "momentum", "iteration.max_iterations": "3"})
+    assert vf.run(problem).proved_rate is None
+    smooth = vf.run(problem.with_keys({"contact.friction": "0"}))
+    assert smooth.proved_rate.value == pytest.approx(momentum_rate(float(smooth.choice.rho)))
+
+
+def test_iqn_ils_takes_the_steps_that_its_authors_print():
+    """Differences to the newest pair instead of consecutive ones span the same columns, as they have it."""
+    random, theta = np.random.default_rng(4), 0.3
+    A, b = random.standard_normal((8, 8)), random.standard_normal(8)
+    T = lambda x: b - A @ x + 0.1 * np.sin(x)
+    step, x, xs, rs = RULES["iqn-ils"].on_vectors(theta), np.zeros(8), [], []
+    for i in range(7):
+        image = T(x)
+        xs.append(image)
+        rs.append(image - x)
+        wanted = x + theta * rs[0]
+        if i:
+            V, W = (np.column_stack([old - all_[-1] for old in all_[:-1]]) for all_ in (rs, xs))
+            wanted = image + W @ np.linalg.solve(V.T @ V, -V.T @ rs[-1])
+        x = step(x, image)
+        assert x == pytest.approx(wanted, rel=1e-8, abs=1e-8 * np.abs(wanted).max())
+
+
 def test_momentum_needs_rho():
     with pytest.raises(ValueError, match="rho"):
         RULES["momentum"].begin(pressed(1), 0.5, None)
