@@ -185,10 +185,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("if dear <= DEAR:", "if True:"),
         ("most if tied else min([most, *rising])", "most"),
         ("if ratio >= predicted_rate(rho):", "if True:"),
-        (
-            "*(([], []) if friction or not of.signed else bounds(seen, parallel=of.parallel))",
-            "*bounds(seen, parallel=of.parallel)",
-        ),
+        ("*(([], []) if friction or not of.signed else bounds(seen, of))", "*bounds(seen, of)"),
         ("readings_with_friction(readings), None", "readings, rho"),
         ("hi = min(upper", "hi = max(upper"),
         ("if interval.contradiction is not None", "if False"),

@@ -158,18 +158,27 @@ def neumann_and_contact(discrete: Json) -> list[Json]:
 def contact_positions(discrete: Json) -> tuple[list[arb], list[arb]]:
     """Positions of the contact nodes and the Neumann nodes, along x or along their lines: as the weights have it.
 
-    The weights must belong to the trapezoid rule for one of these, and a kernel with a radius must be its hat.
-    Positions may be rounded: both are compared up to 1e-6, and the proof uses the numbers that are listed.
+    The nodes must follow each other along the boundary.  The weights must belong to the trapezoid rule for one of these
+    positions, which increase, and a kernel with a radius must be its hat.  Positions may be rounded: both are compared
+    up to 1e-6, and the proof uses the numbers that are listed.
     """
     weights, both = [rational(w) for w in discrete["weights"]], []
     for body in neumann_and_contact(discrete):
+        edges = {(cell[i - 1], cell[i]) for cell in body["cells"] for i in range(3)}
+        follow = all(((a, b) in edges) != ((b, a) in edges) for a, b in pairwise(body["surface"]))
+        demand(follow, "contact nodes that follow each other along the boundary")
         nodes = [[arb(rational(x)) for x in body["points"][i]] for i in body["surface"]]
         lengths = (((a - x) ** 2 + (b - y) ** 2).sqrt() for (a, b), (x, y) in pairwise(nodes))
         both.append(([x for x, _ in nodes], [*accumulate(lengths, initial=arb(0))]))
     for other, own in zip(*both, strict=True):
         widths = [b - a for a, b in pairwise([own[0], *own, own[-1]])]
         halves = [(a + b) / 2 for a, b in pairwise(widths)]
-        if len(halves) == len(weights) and all(close(w, h, h) for w, h in zip(weights, halves, strict=True)):
+        increase = all(width > 0 for width in widths[1:-1])
+        if (
+            increase
+            and len(halves) == len(weights)
+            and all(close(w, h, h) for w, h in zip(weights, halves, strict=True))
+        ):
             return own, (other if discrete["transfer"] else own)
     raise Refused("needed the trapezoid weights of the contact nodes")
 

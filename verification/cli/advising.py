@@ -94,13 +94,14 @@ def of_kind(command: Callable[..., None]) -> Callable[..., None]:
     @click.option("--parallel", is_flag=True, help="Parallel coupling: both solvers run at once.")
     @wraps(command)
     def typed(kind: str | None, tied: bool, parallel: bool, **given: Any) -> None:
-        if tied and kind not in (None, "tied"):
-            needed = f"received --tied with --kind {kind}: needed one of them"
-            raise click.UsageError(needed, click.get_current_context())
+        try:
+            of = kind_of(kind, tied=tied, parallel=parallel)
+        except ValueError as error:
+            raise click.UsageError(str(error), click.get_current_context()) from None
         if parallel and given.get("snippets"):
             needed = "received --snippets with --parallel: the blocks are of serial coupling"
             raise click.UsageError(needed, click.get_current_context())
-        command(kind=kind_of(kind, tied=tied, parallel=parallel), **given)
+        command(kind=of, **given)
 
     return typed
 
@@ -313,12 +314,10 @@ def run(
     if len(ratios) > 1 and kind.signed:
         needed = "needed one, or the --log of each; several ratios are of --kind general"
         raise click.UsageError(f"received {len(ratios)} --ratio: {needed}", context)
-    if friction and kind.linear:
-        raise click.UsageError(f"received {kind.typed}with --friction: nothing slips there", context)
-    if kind.parallel and (friction or not kind.signed):
-        beside = "--friction" if friction else "--kind general"
-        needed = "needed vectors, ndtheory advise vectors, as residuals say nothing then"
-        raise click.UsageError(f"received --parallel with {beside}: {needed}", context)
+    try:
+        kind.assumes(friction)
+    except ValueError as error:
+        raise click.UsageError(str(error), context) from None
     from verification.coupling.from_logs import advise_logs
     from verification.coupling.from_runs import advise_run
     from verification.coupling.log_lines import PatternError

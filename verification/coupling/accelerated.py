@@ -19,7 +19,7 @@ from ndtheory.keys import Part, key
 from ndtheory.keys import says as means
 from verification.coupling.kinds import Kind
 from verification.coupling.log_files import Log
-from verification.coupling.readings import SHOWS_MOST, NextRun, few, rounded_down
+from verification.coupling.readings import NextRun, few, rounded_down, shows_most
 from verification.coupling.spectrum import MARGIN, Spectrum
 
 #: A factor counts as long as the residual is above this share of the largest: the solvers' own accuracy is below it.
@@ -146,7 +146,7 @@ def spectrum_of(logs: Iterable[Accelerated], kind: Kind) -> Spectrum | None:
 def after_accelerated(spectrum: Spectrum | None, kind: Kind) -> NextRun:
     """The theta to paste of a tied interface, or the run with constant relaxation that shows more."""
     if spectrum is None:
-        why = f"{SHOWS_MOST}. Or save some iterates of the run as it is, and type ndtheory advise vectors"
+        why = f"{shows_most(kind)}. Or save some iterates of the run as it is, and type ndtheory advise vectors"
         return NextRun(theta=1.0, why=why)
     theta = rounded_down(min(Fraction(spectrum.theta), kind.most))
     ends = f"2/(2 + least + largest) with lambda from {few(spectrum.low)} to {few(spectrum.high)} by Aitken's factors"

@@ -357,7 +357,7 @@ def couple(
     twice : bool
         True to evaluate T at the start once more: that shows the noise of the solvers, and whether they have a memory.
     max_iterations : int
-        The most evaluations of T; fewer where the residual runs away.
+        The most evaluations of T, the one more of ``twice`` among them; fewer where the residual runs away.
     listen : callable, optional
         Called with a :class:`CouplingState` after each evaluation: ``print`` shows one line each.  Where it returns
         True the coupling ends here, with the outcome ``interrupted``.
@@ -384,7 +384,7 @@ def couple(
     coupling = Coupling(rule, theta, kind=kind, parallel=parallel, absolute=absolute, tolerance=tolerance)
     g, whole = _vector("start", start), lambda value: value >= 1 and value.denominator == 1
     max_iterations = int(take("max_iterations", max_iterations, "a whole number > 0", whole))
-    ending = Ending(0.0, max_iterations - 1, patience=math.inf, growing=GROWING)
+    ending = Ending(1.0, max_iterations - 1 - twice, patience=math.inf, growing=GROWING)
     seen, history, displacement = list[Evaluation](), list[float](), g
 
     def T(x: Floats) -> Floats:
@@ -399,9 +399,7 @@ def couple(
     def ended(found: Evaluation) -> Outcome | None:
         coupling.see(found.g, found.image)
         history.append(coupling.residual)
-        outcome = ending.at(coupling.size, math.inf)
-        if coupling.arrived:
-            outcome = Outcome.CONVERGED
+        outcome = ending.at(coupling.size, coupling.size, lambda: coupling.arrived)
         if listen is not None:
             left = 0 if outcome is Outcome.CONVERGED else _steps_left(history, coupling.tolerance)
             advice = coupling.advice

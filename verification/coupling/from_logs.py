@@ -25,7 +25,6 @@ from verification.coupling.readings import (
     NextRun,
     Observed,
     RunReading,
-    assumed,
     few,
     kept,
     level,
@@ -174,7 +173,7 @@ def advise_logs(
     given = [(Path(path), number(theta)) for path, theta in logs]
     if not given:
         raise ValueError("needed one log or more")
-    assumed(of, friction)  # what goes together
+    of.assumes(friction)  # what goes together
     read = [(read_log(path, pattern, name=format, log10=log10), theta) for path, theta in given]
     read = [(of_both_fields(log) if of.parallel else log, theta) for log, theta in read]
     accelerated = tuple(seen_accelerated(log) for log, _ in read if log.accelerator is not None)
@@ -184,7 +183,7 @@ def advise_logs(
     if not seen:
         known |= {"spectrum": spectrum if of.linear else None, "interval": interval_of([], [])}
         return Advice.of(Logs(readings=(), rho=None, next=after_accelerated(spectrum, of), **known))
-    interval = interval_of(*(([], []) if friction or not of.signed else bounds(seen, parallel=of.parallel)))
+    interval = interval_of(*(([], []) if friction or not of.signed else bounds(seen, of)))
     if not of.signed:
         steady = [(log.theta, log.slowest) for log in seen if not log.explodes]
         boxes = [general.boxes_of(at, ratio) for at, ratio in steady if ratio is not None]
@@ -219,7 +218,7 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
     if log.theta is not None and abs(log.theta - float(theta)) > off * (1 + 1e-9):
         named = f"the log names a relaxation factor of {log.theta:g}: needed the same theta, received {float(theta):g}"
         raise ProblemError(str(log.path), "", None, named)
-    columns = tuple(seen_column(column, theta, parallel=kind.parallel) for column in log.columns)
+    columns = tuple(seen_column(column, theta, kind) for column in log.columns)
     bare = SeenLog(
         file=str(log.path),
         form=log.form,
@@ -238,9 +237,9 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
     if kind.parallel and bare.stays:
         readings, following = (level(theta),), NextRun(theta=rounded_down(theta / 4), why=STAYS.format(few(theta)))
     elif kind.parallel and ratio is not None:
-        readings, following, rho = read_parallel(theta, ratio, linear=kind.linear)
+        readings, following, rho = read_parallel(theta, ratio, kind)
     elif ratio is not None and grows:
-        readings, following, _ = read_observed(theta, ratio)
+        readings, following, _ = read_observed(theta, ratio, kind)
         if plateau is not None and one_mode(theta, ratio, plateau):
             also = [reading for reading in read_plateau(theta, plateau)[0] if reading.kind == "plateau"]
             readings = (*readings[:1], *also, *readings[1:])
@@ -254,11 +253,11 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
             words = f"; if these data are not relaxed, rho is {few(other)}"
             readings = tuple(replace(one, says=one.says + words * (one.kind == "plateau")) for one in readings)
     elif bare.stays:
-        readings, following, _ = read_observed(theta, Observed.known(Fraction(1)))
+        readings, following, _ = read_observed(theta, Observed.known(Fraction(1)), kind)
         if all(column.residual in RELATIVE for column in columns if column.count("level")):
             readings = (level(theta),)  # of a relative residual also a run that grows
     elif ratio is not None:
-        readings, following, rho = read_observed(theta, ratio)
+        readings, following, rho = read_observed(theta, ratio, kind)
         if not bare.converges and all(reading.kind != "level" for reading in readings):
             readings, rho = (*readings, level(theta, bounds=False)), None
     else:
@@ -300,6 +299,10 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
     if all(one.kind == "short" and one.height > LARGE and one.steps >= FEW for one in paces):
         why = "half of it, as the residual is about as large at the end of each window as ever"
         return NextRun(theta=rounded_down(theta / 2), why=why)
+    if any(one.kind == "floor" for one in paces):
+        reached = f"the residual stays at {max(one.height for one in paces):.0e} of its largest value"
+        why = f"the same again, with solvers that converge further: {reached} before a ratio shows"
+        return NextRun(theta=float(theta), why=why, again=True)
     steps = f"{steps_needed(theta)} steps or more in one time window"
     again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
     if all(one.kind == "short" for one in paces):
@@ -408,7 +411,7 @@ def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, kind:
     if dear <= DEAR:
         says = f"the logs together leave one reading: {ends_in_words(boxes)}; rho is taken at its upper end"
         only = RunReading(kind="mode-high", value=stiffest - 1, lo=None if lo is None else below(lo), says=says)
-        following = NextRun(theta=rounded_down(theta), why=cost_in_words(boxes, dear))
+        following = NextRun(theta=rounded_down(theta), why=cost_in_words(boxes, dear, kind))
         return (only,), following, Fraction(stiffest) - 1
     rising = [float(log.theta) for log in logs if log.diverges]
     theta = rounded_down(ends.telling(boxes, known, most if tied else min([most, *rising])))
@@ -426,12 +429,14 @@ def ends_in_words(boxes: Sequence[Box]) -> str:
     return " and ".join(within)
 
 
-def cost_in_words(boxes: Sequence[Box], dear: float) -> str:
+def cost_in_words(boxes: Sequence[Box], dear: float, kind: Kind) -> str:
     """The reason for a theta, in words."""
     times = (
         "the fewest steps" if dear < 1.05 else f"at most {math.ceil(10 * dear - 1e-9) / 10:g} times the fewest steps"
     )
-    where = f"as the logs leave them where contact does not change, with {ends.FEWEST_MODES} modes or more"
+    where = (
+        f"as the logs leave them{kind.given(' where contact does not change')}, with {ends.FEWEST_MODES} modes or more"
+    )
     return f"{times} if {ends_in_words(boxes)}, {where}"
 
 
@@ -447,7 +452,7 @@ def robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
         return best
     theta, dear = ends.cheapest(boxes, best.theta)
     smaller = rounded_down(theta)
-    return best if smaller >= best.theta else NextRun(theta=smaller, why=cost_in_words(boxes, dear))
+    return best if smaller >= best.theta else NextRun(theta=smaller, why=cost_in_words(boxes, dear, CONTACT))
 
 
 def fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:

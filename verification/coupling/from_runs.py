@@ -15,7 +15,6 @@ from verification.coupling.readings import (
     Made,
     NextRun,
     Observed,
-    assumed,
     few,
     read_observed,
     read_parallel,
@@ -107,7 +106,7 @@ def advise_run(
     ((), 0.022, 0.3146)
     """
     of = kind_of(kind, tied=tied, parallel=parallel)
-    assumed(of, friction)  # what goes together
+    of.assumes(friction)  # what goes together
     needed = f"the theta of a run, {of.thetas} (1e-75 or more)"
     least = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
     each = [
@@ -128,9 +127,7 @@ def advise_run(
         return Advice.of(OneRun(next=following, rho=None, spectrum=spectrum, **known))
     if len(each) > 1:
         raise ValueError(f"kind {of.name} with earlier runs: needed their logs, or kind general")
-    readings, following, rho = (
-        read_parallel(t, observed, linear=of.linear) if of.parallel else read_observed(t, observed)
-    )
+    readings, following, rho = read_parallel(t, observed, of) if of.parallel else read_observed(t, observed, of)
     bounds = None
     if friction:
         falling, rising = ([(t, observed)], []) if falls else ([], [(t, observed)])

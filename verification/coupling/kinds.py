@@ -35,6 +35,10 @@ class Kind:
         """True if nothing opens or slips, so that zeros are data."""
         return self.name != "contact"
 
+    def given(self, words: str) -> str:
+        """Words for what must hold where something may open or slip; empty where nothing does."""
+        return "" if self.linear else words
+
     @property
     def signed(self) -> bool:
         """True if no eigenvalue is below 0."""
@@ -65,6 +69,27 @@ class Kind:
         """The options of the command line, with a space behind each."""
         kind = {"contact": "", "tied": "--tied ", "general": "--kind general "}[self.name]
         return kind + "--parallel " * self.parallel
+
+    def assumes(self, friction: bool) -> str:
+        """The assumption under which runs of this kind are read.
+
+        Raises
+        ------
+        ValueError
+            Friction where nothing slips, or in parallel coupling; kind general in parallel coupling.
+        """
+        if friction and self.linear:
+            raise ValueError(f"{self.name} with friction: needed one of them, as nothing slips on such an interface")
+        if self.parallel and (friction or not self.signed):
+            what = "friction" if friction else "kind general"
+            needed = "needed vectors (ndtheory advise vectors), as residuals say nothing then"
+            raise ValueError(f"parallel with {what}: {needed}")
+        if friction:
+            return "there is friction, with which no ratio of residuals bounds rho"
+        if not self.signed:
+            return "a linear coupling whose eigenvalues are real, and may be below 0"
+        both = ", and both solvers run at once" * self.parallel
+        return ("nothing opens or slips" if self.linear else "no friction, or a tied interface") + both
 
 
 def kind_of(name: str | Kind | None = None, *, tied: bool = False, parallel: bool = False) -> Kind:

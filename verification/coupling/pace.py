@@ -29,8 +29,9 @@ RELATIVE = ("relative", "previous")
 #: it as its numbers have digits; a run whose contact opens and closes has been seen at 1.0018, within 4 % of P - 1.
 FLAT = 0.01
 
-#: Below this share of the largest residual a level may be the accuracy of the participants' own solvers.
-FLOOR = 1e-3
+#: Below this share of the largest residual a level may be the accuracy of the participants' own solvers; below the
+#: second one it is, where nothing opens.
+FLOOR, LINEAR_FLOOR = 1e-3, 0.1
 
 #: A run whose residual has fallen to this share has converged, and a level below is the accuracy of the solvers.
 CONVERGED = 1e-6
@@ -100,14 +101,14 @@ class Pace:
         return self.most is not None and self.most < 1
 
 
-def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
+def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = False) -> Pace:
     """The course of the residuals of one time window.
 
     The ratio is the median over the last ``steps`` steps of geometric means over an even number of consecutive ones, a
     fifth of the steps: contact that is open and closed alternately makes them alternate, and noise is smaller in a
     mean.  It is steady where these means scatter little between their deciles, and their medians in both halves agree.
     It must be steady over the steps that theta needs; over fewer where the residual has fallen to CONVERGED of the
-    largest, or has grown by as much: neither is a level.
+    largest, or has grown by as much: neither is a level.  Nothing opens where the coupling is ``linear``.
     """
     relative, steps = column.residual in RELATIVE, steps_needed(theta)
     usable = np.flatnonzero(np.isfinite(residuals) & (residuals > 0))
@@ -179,7 +180,8 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
     before = next((found for found in earlier if found.falls or found.grows), None)  # no part of the level itself
     lengths = [n for n in (steps, 2 * steps, 4 * steps) if n <= taken]  # a rough level shows over a longer stretch
     if flat or any(_level(logs[-n - 1 :], float(spread(theta)), limit) for n in lengths):
-        kind: Kind = "floor" if height < FLOOR else "level"
+        fallen = float(values[-1]) if relative else height
+        kind: Kind = "floor" if height < FLOOR or (linear and fallen < LINEAR_FLOOR) else "level"
         if height < CONVERGED and before is not None and before.falls:
             return before
         if before is not None and (kind == "floor" or before.grows):

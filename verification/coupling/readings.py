@@ -12,7 +12,7 @@ from ndtheory.energy_norms import parallel_theta, predicted_theta
 from ndtheory.keys import Part, key
 from ndtheory.keys import says as means
 from ndtheory.number import below, directed
-from verification.coupling.kinds import LARGEST_TO_PASTE, Kind
+from verification.coupling.kinds import CONTACT, LARGEST_TO_PASTE, Kind
 
 #: A ratio must be steady over so many steps at least.
 FEWEST_STEPS = 10
@@ -22,14 +22,17 @@ FEWEST_STEPS = 10
 #: over twenty between 0.96 and 1.06.
 WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
 
-#: The run that shows most: with theta = 1 a mode is multiplied by ``-lambda``, and an open node by 0.
-SHOWS_MOST = "ten steps with theta = 1, if they may be run: if nothing slips or opens, their ratio tends to rho"
-AT_ONE = f"Or begin with {SHOWS_MOST}"
+
+def shows_most(kind: Kind) -> str:
+    """The run that shows most: with theta = 1 a mode is multiplied by ``-lambda``, and an open node by 0."""
+    tends = "sqrt(rho)" if kind.parallel else "rho" if kind.signed else "the largest |lambda|"
+    given = kind.given("if nothing slips or opens, ")
+    return f"ten steps with theta = 1, if they may be run: {given}their ratio tends to {tends}"
 
 
-def or_at_one(least: float) -> str:
+def or_at_one(least: float, kind: Kind) -> str:
     """The offer to begin with theta = 1, after a sentence; nothing where rho is known to be above 1, as it grows."""
-    return "" if least > 1 else f". {AT_ONE}"
+    return "" if least > 1 else f". Or begin with {shows_most(kind)}"
 
 
 #: A run with this theta or a larger one shows what one with theta = 1 would.
@@ -188,32 +191,11 @@ def spread(theta: Fraction) -> Fraction:
     return min(WIDEST, max(NARROWEST, theta / 2))
 
 
-def assumed(kind: Kind, friction: bool) -> str:
-    """The assumption under which runs are read.
-
-    Raises
-    ------
-    ValueError
-        Friction where nothing slips, or in parallel coupling; logs of kind general in parallel coupling.
-    """
-    if friction and kind.linear:
-        raise ValueError(f"{kind.name} with friction: needed one of them, as nothing slips on a {kind.name} interface")
-    if kind.parallel and (friction or not kind.signed):
-        what = "friction" if friction else "kind general"
-        raise ValueError(f"parallel with {what}: residuals say nothing then, needed vectors (ndtheory advise vectors)")
-    if friction:
-        return "there is friction, with which no ratio of residuals bounds rho"
-    if not kind.signed:
-        return "a linear coupling whose eigenvalues are real, and may be below 0"
-    both = ", and both solvers run at once" * kind.parallel
-    return ("nothing opens or slips" if kind.linear else "no friction, or a tied interface") + both
-
-
 # --- readings ---------------------------------------------------------------------------------------------------------
 
 
 def read_observed(
-    theta: Fraction, ratio: Observed, *, converges: bool = True
+    theta: Fraction, ratio: Observed, kind: Kind = CONTACT, *, converges: bool = True
 ) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """Every reading of a ratio of residuals at theta, the run to make next, and rho of the only reading.
 
@@ -223,7 +205,7 @@ def read_observed(
     """
     r = ratio.value
     high = (1 + r) / theta - 1
-    readings = _readings(theta, ratio, high)
+    readings = _readings(theta, ratio, high, kind)
     kinds = [reading.kind for reading in readings]
     best = predicted_theta(high)
     between = 2 / (high + Fraction(7, 4))  # above the best theta of mode-high, below the one at which it diverges
@@ -247,12 +229,13 @@ def read_observed(
     return readings, NextRun(theta=rounded_down(following), why=why), rho
 
 
-def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunReading, ...]:
+def _readings(theta: Fraction, ratio: Observed, value: Fraction, kind: Kind) -> tuple[RunReading, ...]:
     """The readings of a ratio; ``value`` is the lambda of a mode that changes its sign."""
     r, high, low = ratio.value, (1 + ratio.least) / theta - 1, (1 - ratio.most) / theta - 1
     fastest = f"the stiffest mode in this run has lambda = {few((1 + ratio.most) / theta - 1)} at most"
-    about = "and about that if all of Gamma_c stays closed"
-    proved = f"without friction, or tied, rho is at least {_at_least(high)}, {about}"
+    given = kind.given("without friction, or tied, ")
+    about = f"and about that{kind.given(' if all of Gamma_c stays closed')}"
+    proved = f"{given}rho is at least {_at_least(high)}, {about}"
     if ratio.least > 1:
         says = f"the residual grows by this ratio in every step: {proved}"
     elif ratio.least > 1 - theta:
@@ -262,7 +245,7 @@ def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunRea
     found = [RunReading(kind="mode-high", value=float(value), lo=below(high), says=says)]
     if ratio.least <= 1 - theta:
         low = max(low, Fraction(0))
-        bound = f"without friction, or tied, rho is at least {_at_least(low)}"
+        bound = f"{given}rho is at least {_at_least(low)}"
         says = f"the softest mode keeps its sign and is the slowest: {bound}; {fastest}"
         found.append(RunReading(kind="mode-low", lo=below(low), says=says))
     sure = max(ratio.most - r, r - ratio.least)
@@ -281,7 +264,7 @@ def rho_in_parallel(theta: Fraction, ratio: Fraction) -> Fraction:
 
 
 def read_parallel(
-    theta: Fraction, ratio: Observed, *, linear: bool
+    theta: Fraction, ratio: Observed, kind: Kind
 ) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """The same for *parallel* coupling, where each mode turns and the stiffest one is always the slowest."""
     least, rho = (rho_in_parallel(theta, r) for r in (ratio.least, ratio.value))
@@ -289,9 +272,10 @@ def read_parallel(
         why = f"no such coupling falls faster than {few(1 - theta)} a step at {few(theta)}: is it serial?"
         return (), NextRun(theta=rounded_down(theta / 2), why=f"half of it; {why}"), None
     least, rho = max(least, Fraction(0)), max(rho, Fraction(0))
-    says = f"the stiffest mode turns and is the slowest: without friction, or tied, rho is at least {_at_least(least)}"
+    given = kind.given("without friction, or tied, ")
+    says = f"the stiffest mode turns and is the slowest: {given}rho is at least {_at_least(least)}"
     found = [RunReading(kind="mode-high", value=float(rho), lo=below(least), says=says)]
-    if not linear and ratio.most >= 1 - spread(theta):
+    if not kind.linear and ratio.most >= 1 - spread(theta):
         found.append(level(theta))
     why = f"1/(1 + rho) with rho = {few(rho)}"
     decides = None if len(found) > 1 else rho
@@ -323,7 +307,9 @@ def level(theta: Fraction, bounds: bool = True) -> RunReading:
     least = 2 / theta - 1
     says = "contact opens and closes alternately, and the residual stays at a level or grows for a while only"
     if bounds:
-        says += f": without friction rho is at least {_at_least(least)}, nothing more"
+        says += (
+            f": without friction, and with solvers more accurate than that level, rho is at least {_at_least(least)}"
+        )
         says += "; with friction this does not bound rho"
     else:
         says += ", or the solvers of both sides are not more accurate: this says nothing about rho"

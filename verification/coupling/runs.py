@@ -14,14 +14,13 @@ from verification.coupling.evidence import Evidence
 from verification.coupling.kinds import Kind
 from verification.coupling.methods import MethodRow
 from verification.coupling.readings import (
-    AT_ONE,
     LIKE_ONE,
     OF_OPEN_NODES,
     Made,
     NextRun,
     RunReading,
     anew,
-    assumed,
+    or_at_one,
     pasted_or_not,
     steps_needed,
 )
@@ -103,7 +102,7 @@ class Runs(Evidence):
     @property
     def assumes(self) -> str:
         """The assumption under which the runs are read."""
-        return assumed(self.kind, self.rubs)
+        return self.kind.assumes(self.rubs)
 
     @property
     def why_no_theta(self) -> str:
@@ -202,6 +201,6 @@ def decided(
         following, rho = anew(following, made), None
         learns = not following.kept and friction_bounds is None
         if learns and not any(one.rises or one.theta >= LIKE_ONE for one in made):
-            following = replace(following, why=f"{following.why}. {AT_ONE}")
+            following = replace(following, why=following.why + or_at_one(0, kind))
     left = tuple(one for one in readings if not (kind.linear and one.kind in OF_OPEN_NODES))
     return {"readings": left, "next": following, "rho": rho, "friction_bounds": friction_bounds}

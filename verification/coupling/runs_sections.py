@@ -64,7 +64,7 @@ def _of_logs(logs: Logs, found: Advice) -> Iterator[Section]:
 def _end(runs: Runs, found: Advice, again: str) -> Section:
     theta = f"{runs.next.theta:g}"
     then = f"no run; keep theta = {theta}" if runs.next.kept and not found.roles else again.format(theta)
-    friction = "a bound of rho with friction, or " * runs.kind.signed
+    friction = runs.kind.given("a bound of rho with friction, or ")
     return closing(f"{friction}that a reading is the right one", then=then)
 
 

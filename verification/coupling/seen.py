@@ -14,6 +14,7 @@ from scipy.optimize import minimize_scalar
 from ndtheory.keys import Part, key
 from ndtheory.keys import says as means
 from ndtheory.number import above, below
+from verification.coupling.kinds import CONTACT, Kind
 from verification.coupling.log_files import Column, Log
 from verification.coupling.pace import MOST_WINDOWS, RELATIVE, Pace, pace, pooled, together
 from verification.coupling.readings import (
@@ -41,8 +42,10 @@ AGREE = Fraction(103, 100)
 
 #: Assumption under which a ratio bounds rho from below, and from above.
 FROM_BELOW = "no friction, or a tied interface"
-FROM_FEW = f"{FROM_BELOW}, and a norm in which the coupling is symmetric, so that ratios only rise"
+MORE_ACCURATE = ", and solvers that are more accurate than the level at which the residual stays"
+RATIOS_RISE = ", and a norm in which the coupling is symmetric, so that ratios only rise"
 TIED = "a tied interface"
+LINEAR = "a linear coupling"
 FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
 
 _TOGETHER: dict[str, Any] = {
@@ -93,10 +96,10 @@ class SeenColumn(Part):
     @property
     @means(
         "windows whose residual changes by a steady ratio at its end (`steady`), stays at a `level`, is relative and "
-        "flat above 1 (`plateau`), ends at a level below 1e-3 of the largest, which the accuracy of the solvers may "
-        "set (`floor`), or from which nothing follows (`unsteady`, and `short` of too few steps), but of `growth` the "
-        "last ratio as a bound from below; of more than 300 "
-        "windows the last ones are read, and only those of ten steps and more where there are any",
+        "flat above 1 (`plateau`), ends at a level below 1e-3 of the largest, or 0.1 where nothing opens, which the "
+        "accuracy of the solvers may set (`floor`), or from which nothing follows (`unsteady`, and `short` of too few "
+        "steps), but of `growth` the last ratio as a bound from below; of more than 300 windows the last ones are "
+        "read, and only those of ten steps and more where there are any",
         type="map of integer",
         unit="1",
     )
@@ -126,25 +129,20 @@ class SeenColumn(Part):
         return found
 
 
-def seen_column(column: Column, theta: Fraction, *, parallel: bool = False) -> SeenColumn:
+def seen_column(column: Column, theta: Fraction, kind: Kind = CONTACT) -> SeenColumn:
     """Read the windows of one field one by one and put them together; pool them where none shows a ratio."""
     windows = ([window for window in column.windows if len(window) > FEWEST_STEPS] or column.windows)[-MOST_WINDOWS:]
-    paces = tuple(pace(window, column, theta) for window in windows)
+    paces = tuple(pace(window, column, theta, linear=kind.linear) for window in windows)
     short = all(one.kind in ("short", "unsteady") for one in paces)
     relative, steps = column.residual in RELATIVE, min(steps_needed(theta), POOLED)
+    # a field of parallel coupling grows where the other one falls
+    no_ratio = ("plateau", "growth") if kind.parallel else ("plateau",)
     return SeenColumn(
         name=column.name,
         residual=column.residual,
         paces=paces,
         windows=len(column.windows),
-        # a field of parallel coupling grows where the other one falls
-        ratio=together(
-            [
-                one
-                for one in paces
-                if one.value is not None and one.kind not in ("plateau", "growth" if parallel else "")
-            ]
-        ),
+        ratio=together([one for one in paces if one.value is not None and one.kind not in no_ratio]),
         plateau=together([one for one in paces if one.kind == "plateau"]),
         pooled=pooled(windows, relative=relative, steps=steps) if short else None,
     )
@@ -334,22 +332,25 @@ class RhoInterval(Part):
     )
 
 
-def bounds(logs: Sequence[SeenLog], *, parallel: bool = False) -> tuple[list[LogBound], list[LogBound]]:
+def bounds(logs: Sequence[SeenLog], kind: Kind = CONTACT) -> tuple[list[LogBound], list[LogBound]]:
     """Every bound of rho from below and from above that a log gives."""
     lower, upper = [], []
-    rho = lambda r, theta: rho_in_parallel(theta, r) if parallel else (1 + r) / theta - 1
+    given = lambda words: kind.given(words) or LINEAR
+    rho = lambda r, theta: rho_in_parallel(theta, r) if kind.parallel else (1 + r) / theta - 1
     for log in logs:
         ratio, plateau, theta = log.slowest, log.plateau, log.theta
         if ratio is not None and not {"mode-low", "open"} & {reading.kind for reading in log.readings}:
             says = f"its residual changes by {few(ratio.least)} a step or more, beyond 1 - theta"
-            assumes = FROM_FEW if log.explodes else FROM_BELOW
+            assumes = given(FROM_BELOW)
+            assumes += RATIOS_RISE * log.explodes
             lower.append(LogBound(value=rho(ratio.least, theta), log=log, says=says, assumes=assumes))
         if log.diverges:
-            lower.append(LogBound(value=2 / theta - 1, log=log, says="it does not converge", assumes=FROM_BELOW))
+            assumes = given(FROM_BELOW) + MORE_ACCURATE * log.stays
+            lower.append(LogBound(value=2 / theta - 1, log=log, says="it does not converge", assumes=assumes))
         if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):
             says = f"the relative residual of relaxed data stays at {few(plateau.value)}"
-            lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=TIED))
+            lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=given(TIED)))
         if ratio is not None and log.converges:
             says = f"its residual changes by {few(ratio.most)} a step at most"
-            upper.append(LogBound(value=rho(ratio.most, theta), log=log, says=says, assumes=FROM_ABOVE))
+            upper.append(LogBound(value=rho(ratio.most, theta), log=log, says=says, assumes=given(FROM_ABOVE)))
     return lower, upper

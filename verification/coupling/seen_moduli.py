@@ -14,7 +14,7 @@ from ndtheory.keys import Part, key, says
 from ndtheory.moduli import Moduli
 from ndtheory.number import above
 from verification.coupling.evidence import Evidence
-from verification.coupling.kinds import LARGEST_TO_PASTE, BodyNumber
+from verification.coupling.kinds import LARGEST_TO_PASTE, BodyNumber, Kind
 from verification.coupling.readings import NextRun, or_at_one, rounded_down
 from verification.coupling.roles import PROVED, Role
 from verification.problem.writing import written_number
@@ -211,7 +211,9 @@ class ElasticBodies(Evidence):
         where = "tied" if parallel else "without friction or tied"
         among = "the largest bound above" if self.corners is None else "the bound above"
         who = "either body" if (body := self.prefers(())) is None else f"body {body}"
-        return from_below(self.largest(role), f"the Neumann problem on {who}, ", f" with {among}", f" {where}")
+        return from_below(
+            self.largest(role), self.kind, f"the Neumann problem on {who}, ", f" with {among}", f" {where}"
+        )
 
     @property
     def why_no_theta(self) -> str:
@@ -250,11 +252,11 @@ class ElasticBodies(Evidence):
         return f"rho is at least {', '.join(each)}, where a piece of Gamma_c may stick"
 
 
-def from_below(bound: float, who: str = "", among: str = "", where: str = "") -> NextRun:
+def from_below(bound: float, kind: Kind, who: str = "", among: str = "", where: str = "") -> NextRun:
     """The run to begin with where only a bound of rho from below is known."""
     why = (
         f"{who}1/(2 + {bound:.4g}){among}, which contracts{where} if rho is below {3 + 2 * bound:.4g}; "
-        f"halve it if the residual does not fall{or_at_one(bound)}"
+        f"halve it if the residual does not fall{or_at_one(bound, kind)}"
     )
     return NextRun(theta=rounded_down(1 / (2 + Fraction(bound))), why=why)
 

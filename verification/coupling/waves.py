@@ -186,7 +186,7 @@ class Fluid(Waves):
 
     def next_run(self) -> NextRun:
         """A run to begin with."""
-        return from_below(max(self.values))
+        return from_below(max(self.values), self.kind)
 
     @property
     def why_no_theta(self) -> str:

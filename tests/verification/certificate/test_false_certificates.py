@@ -4,7 +4,7 @@ import json
 from collections import Counter
 from fractions import Fraction
 from importlib import import_module
-from itertools import product
+from itertools import pairwise, permutations, product
 from pathlib import Path
 
 import numpy as np
@@ -156,6 +156,22 @@ def test_weights_and_a_kernel_that_are_not_those_of_the_points_are_refused(monke
         assert refused(document, kernel=[quarter(row) for row in kernel]) == ""
         assert "trapezoid weights" in refused(document, weights=quarter(weights))
         assert "kernel that it lists" in vf.check_again(document).words
+
+
+@pytest.mark.parametrize("order", [p for p in permutations(range(4)) if p[0] < p[-1] and p != (0, 1, 2, 3)], ids=str)
+def test_contact_nodes_in_another_order_are_refused(order):
+    """With the cells between them going forth and back the trapezoid rule has half of the weights inside."""
+    problem = vf.Problem.from_dict(changed(ONE_GRID, body1={"cells": [3, 1]}, body2={"cells": [3, 1]}))
+    document = json.loads(vf.certify(problem, theta="1/10", edition="energy").to_json())
+    discrete = document["discrete"]
+    at = [Fraction(discrete["body1"]["points"][i][0]) for i in discrete["body1"]["surface"]]
+    put = lambda values: [values[i] for i in order]
+    widths = [b - a for a, b in pairwise([put(at)[0], *put(at), put(at)[-1]])]
+    weights = [str(abs(a + b) / 2) for a, b in pairwise(widths)]
+    bodies = {name: {**discrete[name], "surface": put(discrete[name]["surface"])} for name in ("body1", "body2")}
+    kernel = [put(row) for row in put(discrete["kernel"])]
+    assert refused(document, weights=weights, kernel=kernel, **bodies)
+    assert not refused(document)
 
 
 def test_a_body_with_a_hole_has_a_certificate(tmp_path, monkeypatch):

@@ -319,7 +319,7 @@ def test_the_readings_of_a_ratio(theta, ratio, kinds):
 
 def test_a_bound_in_words_is_not_rounded_up_and_a_theta_of_1_is_a_run_of_its_own():
     assert "rho is at least 5.333, " in vf.advise_run("0.3", "0.9").readings[0].says  # 16/3
-    assert "rho is at least 5.666, " in vf.advise_run("0.3", "1").readings[1].says  # 17/3
+    assert "rho is at least 5.666; " in vf.advise_run("0.3", "1").readings[1].says  # 17/3
     assert same_run(1.0, F(1))
     assert not same_run(0.99, F(1))
     assert same_run(0.3005, F(3, 10))

@@ -340,7 +340,7 @@ def test_the_ends_of_the_spectrum_in_words():
     [(1.0, "the fewest"), (1.049, "the fewest"), (1.05, "1.1 times"), (1.1 + 1e-15, "1.1 times"), (1.11, "1.2 times")],
 )
 def test_what_a_theta_costs_is_rounded_up_and_names_its_assumption(dear, words):
-    said = from_logs.cost_in_words([Box(a=(1.0, 1.0), b=(4.0, 4.0))], dear)
+    said = from_logs.cost_in_words([Box(a=(1.0, 1.0), b=(4.0, 4.0))], dear, CONTACT)
     assert words in said
     assert "where contact does not change, with 5 modes or more" in said
 

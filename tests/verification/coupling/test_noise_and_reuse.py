@@ -32,7 +32,28 @@ def test_no_error_is_called_smaller_than_the_noise_of_the_solvers(noise):
     assert seen.error_high > noise
     exact = twice(lambda u: 1 - VALUES * (u - 1)).advice.vectors
     assert (exact.apart, exact.noise) == (0.0, 0.0)
-    assert found.iterations == twice(lambda u: 1 - VALUES * (u - 1)).iterations == 13
+    assert found.iterations == twice(lambda u: 1 - VALUES * (u - 1)).iterations == 12
+
+
+@pytest.mark.parametrize("kind", ["contact", "tied", "general"])
+def test_a_log_that_ends_in_the_noise_of_a_solver_bounds_nothing_by_its_level(kind, tmp_path):
+    """In contact only a level below 1e-3 is surely none of contact that opens and closes: its bound says so."""
+    for seed, noise in enumerate((3e-2, 1e-2, 1e-3, 1e-4)):
+        random, residuals, g = np.random.default_rng(seed), [], np.zeros(12)
+        for _ in range(120):
+            image = 1 - np.linspace(0.2, 3, 12) * g
+            image += noise * np.abs(image).mean() * random.standard_normal(12)
+            residuals.append(f"{np.linalg.norm(image - g):.6e}\n")
+            g = g + 0.3 * (image - g)
+        (tmp_path / "log").write_text("".join(residuals))
+        found = vf.advise_logs([(tmp_path / "log", "0.3")], kind=kind)
+        least = found.interval.lo
+        assert found.theta is None
+        assert "low level" in found.logs[0].columns[0].says or kind == "contact"
+        assert least is None or "solvers that are more accurate" in least.assumes
+        assert least is None or (kind == "contact" and noise >= 1e-3)
+        if kind == "tied":
+            assert "with solvers that converge further" in found.next.why
 
 
 @pytest.mark.parametrize("noise", [1e-8, 1e-6])
