@@ -103,7 +103,7 @@ def test_tied_advice_says_what_it_assumes_and_pastes_the_tied_theta(form):
     assert pasted(answer.out) == f"{document['theta']:g}"
     assert document["theta"] == pytest.approx(best_and_other(document)[0]["theta_tied"], rel=1e-3)
     assert document["theta"] != form("section 6")[1]["theta"]
-    assert "Not claimed: that nothing opens or slips." in answer.out
+    assert "Not claimed: that nothing opens or slips, or that the coupling is linear." in answer.out
     assert f"--theta {document['theta']:g}" in answer.out.splitlines()[-1]
 
 

@@ -42,8 +42,9 @@ class Parallel(Part):
     def of(cls, role: Role) -> Parallel:
         """For a role that is not refused."""
         assert role.rho is not None
-        if role.spectrum is not None and (role.level == "estimated" or not role.spectrum.real):
-            both = role.spectrum.parallel()
+        spectrum = role.spectrum
+        if spectrum is not None and (role.level == "estimated" or not spectrum.real or spectrum.low < 0):
+            both = spectrum.parallel()
             theta, factor = both.theta, both.factor(both.theta)
         else:
             theta = parallel_theta(role.rho.value)

@@ -294,8 +294,8 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
     if all(one.height < CONVERGED for one in paces):
         return kept(theta, f"{_within(paces)}, and shows no ratio")
     if any(one.lost for one in paces):
-        why = "half of it, as the log ends in inf or nan before a ratio shows"
-        return NextRun(theta=rounded_down(theta / 2), why=why)
+        why = "a quarter of it, as the residual runs away before a ratio shows"
+        return NextRun(theta=rounded_down(theta / 4), why=why)
     if all(one.kind == "short" and one.height > LARGE and one.steps >= FEW for one in paces):
         why = "half of it, as the residual is about as large at the end of each window as ever"
         return NextRun(theta=rounded_down(theta / 2), why=why)
@@ -326,8 +326,8 @@ def interval_of(lower: list[LogBound], upper: list[LogBound]) -> RhoInterval:
         one, other = (f"{bound.log.file} with theta = {few(bound.log.theta)}" for bound in (hi, lo))
         contradiction = (
             f"by {one} rho is at most {few(hi.value)}, by {other} at least {few(lo.value)}: there is "
-            "friction, contact changes between the runs, a theta was not constant, or they are not runs of one problem "
-            "in the same roles"
+            "friction, contact changes between the runs, a theta was not constant, the coupling is not symmetric (as "
+            "with convection), or they are not runs of one problem in the same roles"
         )
     return RhoInterval(lo=lo, hi=hi, contradiction=contradiction)
 
@@ -347,7 +347,7 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Deci
         return base.readings, NextRun(theta=_half(logs), why=why), None
     lo, hi, tied = interval.lo, interval.hi, kind.linear
     if (swift := next((log for log in logs if log.swift), None)) is not None and base.rho is None:
-        why = f"{_within(swift.paces)}, and none much faster is to be found"
+        why = f"{_within(swift.paces)}: there are few steps to gain"
         return swift.readings, kept(swift.theta, why), None
     if kind.parallel:
         return base.readings, base.next, base.rho
@@ -403,8 +403,12 @@ def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, kind:
     if not boxes:
         if not tied:
             return None
-        why = "half of the smallest theta, or leave out tied: no tied interface has all of these logs"
-        return base.readings, NextRun(theta=_half(logs), why=why), None
+        why = "no linear coupling with real eigenvalues has all of these logs: a coupling with convection, one that is "
+        why += "not linear, or leave out tied"
+        falling = [(log.slowest.most, log.theta) for log in logs if log.converges and log.slowest is not None]
+        if falling:
+            return base.readings, kept(min(falling)[1], f"it falls fastest; {why}"), None
+        return base.readings, NextRun(theta=_half(logs), why=f"half of the smallest theta; {why}"), None
     if math.isinf(stiffest := max(box.b[1] for box in boxes)):
         return None
     theta, dear = ends.cheapest(boxes, most if tied else float(base.theta))

@@ -532,7 +532,9 @@ class _LogTable:
         begins = np.zeros(len(data), dtype=bool)
         begins[self.again] = True
         if window is not None:
-            begins[1:] |= data[1:, window] != data[:-1, window]
+            new = data[1:, window] != data[:-1, window]
+            elapsed = new.all() and iteration is not None and (np.diff(data[:, iteration]) == 1).all()
+            begins[1:] |= new & (not elapsed)  # a time that passes while iterations are counted
         if iteration is not None:
             counts = data[:, iteration]
             wrong = np.flatnonzero(~np.isfinite(counts))

@@ -138,7 +138,7 @@ def to_try(text: str) -> str:
     if match := next(filter(None, map(_RESIDUAL.search, lines)), None):
         words = re.sub(r"([^\w\s])", r"\\\1", _NUMBER.sub("0", match["before"].strip()))
         pattern = re.sub(r"\s+", r"\\s+", re.sub(r"\b0\b", r"\\S+", words))
-        said.append(f"to try: --pattern '{pattern}\\s*(\\S+)'")
+        said.append(f"to try: --pattern '{pattern}\\s*([^\\s,;]+)'")
     return ", ".join(said)
 
 

@@ -132,12 +132,15 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
     if height < CONVERGED or grown:  # no level: fewer steps show the ratio
         steps = min(steps, max(FEWEST_STEPS, taken // 2))
     known: dict[str, Any] = {"length": len(residuals), "height": height, "arrived": arrived, "adapts": _adapts(values)}
+    growth = values[-2:] / values[-3:-1] if taken > 1 and not relative else np.zeros(1)
+    explodes = growth.min() > EXPLODES and values[-1] == values.max()
+    lost |= bool(explodes and growth.max() >= ABSURD)
+    if explodes and not lost:
+        r = float(growth[-1])
+        growing = Pace(kind="growth", value=r, least=r * (1 - 1e-9), most=r, steps=taken, **known)
     if taken < steps:
-        growth = values[-2:] / values[-3:-1] if taken > 1 and not relative else np.zeros(1)
-        if growth.min() > EXPLODES and growth.max() < ABSURD and values[-1] == values.max():
-            r = float(growth[-1])
-            return Pace(kind="growth", value=r, least=r * (1 - 1e-9), most=r, steps=taken, lost=lost, **known)
-        return Pace(kind="short", steps=max(taken, int(arrived)), lost=lost, **known)
+        short = Pace(kind="short", steps=max(taken, int(arrived)), lost=lost, **known)
+        return growing if explodes and not lost else short
     known["steps"] = taken
     logs = np.log(values)
     limit = min(STEADY, float(theta) / 5)
@@ -194,7 +197,7 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
     small = int(np.argmax(values[::-1] > SMALL)) if relative and values.max() > SMALL else taken + 1
     if 0 < small <= steps:  # that a relative residual shows; windows of a few of them can be pooled
         return Pace(kind="short", **(known | {"steps": small - 1, "lost": lost}))
-    return Pace(kind="unsteady", lost=lost, **known)
+    return growing if explodes and not lost else Pace(kind="unsteady", lost=lost, **known)
 
 
 def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> dict[str, Any] | None:

@@ -116,15 +116,13 @@ def of_logs(found: Logs) -> Sections:
 def _seen(logs: Sequence[SeenLog], accelerated: Sequence[Accelerated]) -> Section:
     """The logs, column by column."""
     parts: list[Note | str] = []
-    room = MOST_COLUMNS
+    most = max(MOST_COLUMNS // max(len(logs), 1), 1)
     for log in logs:
         parts.append(f"theta = {float(log.theta):.4g}, {log.form}, {log.file}")
-        for column in log.columns[:room]:
+        for column in log.columns[:most]:
             parts.append(Note(f"{column.name}, {RESIDUALS.get(column.residual, column.residual)}: {column.says}", 4))
-        room -= len(log.columns[:room])
         parts += [Note(words, 4) for words in log.notes]
-    left = sum(len(log.columns) for log in logs) - MOST_COLUMNS
-    if left > 0:
+    if left := sum(len(log.columns[most:]) for log in logs):
         parts.append(f"and {left} columns more, see --json")
     for one in accelerated:
         parts.append(f"{one.accelerator}, {one.form}, {one.file}")

@@ -112,7 +112,7 @@ def paste_and_quote(found: Advice) -> Sections:
 
 def _end(found: Advice, then: Next | str) -> Section:
     """The limits of the advice, and the command to type next."""
-    claims = "that nothing opens or slips" if found.coupling.signed else "that the coupling is linear"
+    claims = "that nothing opens or slips, or " * found.coupling.signed + "that the coupling is linear"
     claims = claims if found.tied else "that the predicted theta is the best one for other loads or meshes"
     return closing(claims, *map(outside_the_theorem, found.evidence.outside), then=then)
 
@@ -259,15 +259,17 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     spectrum = seen.spectrum
     some = lambda number, what: f"{number} {what}{'s' * (number != 1)}"
     of, directions = some(seen.unknowns, "unknown"), some(seen.directions, "independent direction")
-    said = [f"{seen.iterates} iterates of {of}, {directions}"]
-    kinds = ["real: the coupling looks symmetric" if seen.symmetric else "complex: the coupling is not symmetric"]
+    said = [f"{seen.iterates} iterates of {'two fields with ' * found.coupling.parallel}{of}, {directions}"]
+    changes = found.coupling.given(", contact changes") + " or it is not linear"
+    kinds = ["real: the coupling looks symmetric" if seen.symmetric else f"complex: it is not symmetric{changes}"]
     if seen.changing and not seen.negative:
         kinds.append("contact changes between the iterates: a theta for open nodes as well")
         if seen.used < seen.iterates:
             kinds.append(f"read from the last {seen.used}, in which the same nodes are open")
     said.append(f"eigenvalues are {'; '.join(kinds)}")
     if seen.noise is not None:
-        said.append(f"images of dependent directions differ by {figures(seen.noise, 2)} of the largest: noise")
+        differ = f"images of dependent directions differ by {figures(seen.noise, 2)} of the largest"
+        said.append(f"{differ}: noise{found.coupling.given(', or contact that changes')}")
     if seen.apart is None:
         said.append("not seen: noise and memory of the solvers, which one iterate evaluated twice in succession shows")
     elif seen.apart:
@@ -286,12 +288,14 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     else:
         theta, rate = found.chosen(found.best)
         formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
-        formula = "1/(1 + largest)" if found.coupling.parallel else formula
+        formula = "2/(2 + 0 + largest), 0 for open nodes," if seen.seen.low < spectrum.low else formula
+        if found.coupling.parallel:
+            formula = "1/(1 + largest)" if spectrum.low >= 0 else "the theta of least factor over both square roots"
         notes = [
-            "Ritz values: eigenvalues as these vectors show them, from inside; the errors are estimates.",
+            "Ritz values: eigenvalues as these vectors show them, from inside; errors are estimates, for a linear T.",
             f"theta = {theta:.4g} = {formula}, with both errors: factor {near_one(rate)} a step",
         ]
-    if spectrum.low < 0 and not found.coupling.signed:
+    if spectrum.low + spectrum.error_low < 0 and not found.coupling.signed:
         notes.append("An eigenvalue between -1 and 0 is positive feedback; a theta above 1 is no mistake there.")
     rows = [
         ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),

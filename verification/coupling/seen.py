@@ -45,7 +45,7 @@ FROM_BELOW = "no friction, or a tied interface"
 MORE_ACCURATE = ", and solvers that are more accurate than the level at which the residual stays"
 RATIOS_RISE = ", and a norm in which the coupling is symmetric, so that ratios only rise"
 TIED = "a tied interface"
-LINEAR = "a linear coupling"
+LINEAR = "a linear coupling with real eigenvalues"
 FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
 
 _TOGETHER: dict[str, Any] = {

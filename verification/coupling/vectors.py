@@ -56,12 +56,12 @@ OPEN = 1e-12
 
 #: The meaning of images that equal their iterates, and of those that one vector moves away from them.
 SOLVED = "each is a solution already, or X was given for TX; needed iterates from before the run has converged"
-SHIFTED = "all eigenvalues are -1, with which no theta above 0 converges; one solver probably has the wrong sign"
+SHIFTED = "all eigenvalues are -1, with which no theta above 0 converges; has one solver the wrong sign?"
 
-#: The reason for negative eigenvalues where a kind of coupling has none.
+#: What makes negative eigenvalues where a kind of coupling has none.
 WRONG_SIGN = (
-    "one solver probably has the wrong sign (the second solver must return the force that acts on the first body), or "
-    "the coupling has positive feedback (kind general)"
+    "solvers with noise or a memory, one that is far from linear, one solver with the wrong sign (the second one must "
+    "return the force that acts on the first body), or positive feedback (kind general)"
 )
 
 _COUNTS = "length of a vector, number of iterates, of those that were read, and of their independent differences"
@@ -176,7 +176,8 @@ class Vectors(Evidence, Value):
             share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
             return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
         if self.kind.parallel and (self.noise or 0.0) > 1:
-            return "images do not follow from the other field: needed both fields in a row, and their images likewise"
+            needed = "needed both fields in a row, their images likewise, and solvers with less noise"
+            return f"images do not follow from the other field: {needed}"
         return ""
 
     @property
@@ -185,16 +186,15 @@ class Vectors(Evidence, Value):
         if self.no_map:
             return ""
         least = float(self.ritz.real.min())
+        said, causes = f"an eigenvalue seems to be {least:.3g}", self.kind.given("contact that changes, ") + WRONG_SIGN
         if self.kind.signed and self.ritz.real.max() < -REAL:
-            return f"all eigenvalues are negative: {WRONG_SIGN}"
-        said = f"an eigenvalue seems to be {least:.3g}"
-        said += ": with -1 or less no theta above 0 converges" * (least <= RANK - 1)
+            return f"all eigenvalues seem to be negative, which these make: {causes}"
         below_0 = self.kind.linear and least < -max(REAL * (1 + abs(self.spectrum.high)), self.error_low)
         if self.kind.signed and (least <= RANK - 1 or below_0):
-            return f"{said}; solvers with noise or a memory make such ones, or {WRONG_SIGN}"
+            return f"{said}, which these make: {causes}"
         if self.kind.parallel and not self.spectrum.parallel().theta:
-            return "with both solvers at once no theta above 0 converges: run one after the other"
-        return said if least <= RANK - 1 else ""
+            return "by these eigenvalues no theta above 0 converges with both solvers at once: run one after the other"
+        return f"{said}: with -1 or less no theta above 0 converges" if least <= RANK - 1 else ""
 
 
 def seen_in(X: Floats, TX: Floats, *, kind: Kind = CONTACT, starts: NDArray[np.bool_] | None = None) -> Vectors:

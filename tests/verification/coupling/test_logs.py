@@ -163,7 +163,7 @@ def test_a_short_log_says_how_many_steps_are_needed_and_to_keep_a_theta_that_con
     assert (found.roles, found.next.theta) == ((), 0.9)
     assert "keep it: the run converges within 9 iterations" in found.next.why
     lost = written(tmp_path / "b.txt", "1\n1e50\n1e100\n1e200\ninf\n")
-    assert advise_logs([(lost, "0.3")]).next.theta == 0.15
+    assert advise_logs([(lost, "0.3")]).next.theta == 0.075
 
 
 def test_a_level_as_low_as_the_solvers_are_accurate_bounds_nothing(tmp_path):
@@ -291,3 +291,51 @@ def test_a_longer_log_never_shows_less(tmp_path, column):
             shown.append(2 if seen.ratio is not None else 1 if seen.pooled is not None else 0)
         assert shown == sorted(shown), shown
         assert shown[-1] == 2
+
+
+def test_a_time_that_passes_in_every_row_begins_no_window(tmp_path):
+    """A clock beside counted iterations; a time that stands while they are counted begins one."""
+    rows = [(i, 0.8**i, 0.37 * i) for i in range(40)]
+    log = tmp_path / "clock.csv"
+    log.write_text("iter,residual,time\n" + "".join(f"{i},{r:.8e},{t:.3f}\n" for i, r, t in rows))
+    found = advise_logs([(log, "0.45")])
+    assert found.logs[0].columns[0].windows == 1
+    assert found.readings[0].value == pytest.approx(3, rel=0.01)
+    log.write_text("iter,residual,time\n" + "".join(f"{i % 20 + 1},{r:.8e},{i // 20}\n" for i, r, _ in rows))
+    assert advise_logs([(log, "0.45")]).logs[0].columns[0].windows == 2
+
+
+def test_a_log_that_explodes_says_no_less_with_more_rows(tmp_path):
+    """Two modes: the ratio is not steady yet, and the last one still bounds rho."""
+    sizes = np.abs([[(1 - (1 + mode)) ** i for i in range(13)] for mode in (7.3, 17.5)])
+    residuals = np.sqrt(sizes[0] ** 2 + (1e-6 * sizes[1]) ** 2)
+    log, bounds = tmp_path / "residuals.txt", []
+    for rows in (4, 8, 11, 12, 13):
+        log.write_text("".join(f"{r:.8e}\n" for r in residuals[:rows]))
+        found = advise_logs([(log, "1")], kind="tied")
+        bounds.append(found.interval.lo.value)
+        assert 2 / (2 + 18) < found.next.theta < 0.3
+    assert all(more >= less * (1 - F(1, 10**6)) for less, more in itertools.pairwise(bounds))
+    assert 7.29 < bounds[0] < bounds[-1] <= 17.5
+
+
+def test_a_residual_that_runs_away_asks_for_a_smaller_theta(tmp_path):
+    log = tmp_path / "residuals.txt"
+    for rows in ([1.0, 1e3, 1e14], [1.0, 1e5, 1e20, 1e40], [1.0, 50.0, "inf"]):
+        log.write_text("".join(f"{r}\n" for r in rows))
+        assert advise_logs([(log, "1")], kind="tied").next.theta <= 0.25
+
+
+def test_logs_of_a_coupling_that_is_not_symmetric_keep_the_run_that_falls_fastest(tmp_path):
+    """As with convection: no real eigenvalues have these ratios, and no theta is halved for it."""
+    modes, logs = np.array([0.9 + 2j, 0.9 - 2j, 1.8, 0.84]), []
+    for theta in (1.0, 0.5, 0.2):
+        residuals = [np.abs((1 + modes) * (1 - theta * (1 + modes)) ** i).max() for i in range(60)]
+        logs.append((tmp_path / f"{theta}.txt", str(theta)))
+        logs[-1][0].write_text("".join(f"{r:.8e}\n" for r in residuals))
+    found = advise_logs(logs, kind="tied")
+    assert found.theta is None
+    assert (found.next.theta, found.next.kept) == (0.2, True)
+    text = f"{found.next.why} {found.interval.contradiction} {found.interval.lo.assumes}"
+    assert "convection" in text
+    assert "real eigenvalues" in found.interval.lo.assumes

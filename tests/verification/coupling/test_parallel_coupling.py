@@ -267,3 +267,15 @@ def test_a_field_that_has_not_arrived_keeps_the_coupling_going():
     assert coupling.arrived
     with pytest.raises(ValueError, match="both fields"):
         vf.Coupling(parallel=True).see([1.0], [2.0])
+
+
+@pytest.mark.parametrize("rows", [3, 4, 6])
+def test_parallel_positive_feedback_has_a_document_while_rho_is_only_bounded(rows):
+    """All eigenvalues that are seen may be below 0: their roots are real, and no square root of rho is."""
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        one = random.standard_normal((8, 8)) * 0.3
+        T = lambda x, one=one: np.concatenate([x[8:] @ one, x[:8]]) + 1
+        X = np.cumsum(random.standard_normal((rows, 16)), axis=0)
+        found = vf.advise_vectors(X, [T(x) for x in X], kind="general", parallel=True)
+        assert found.to_json()
