@@ -124,7 +124,8 @@ def _by_meshio(path: Path, kind: str) -> tuple[Any, Any, dict[str, Ints], dict[s
     except (Exception, SystemExit) as error:
         if "Incompatible cell data 'gmsh:physical'" in str(error):
             raise NotRead(f"some of its elements belong to a physical group and others to none: {SAVE_ALL}") from None
-        said = [*words.getvalue().splitlines(), str(error) if isinstance(error, ValueError) else ""][0].strip()
+        why = str(error) if str(error).startswith("could not convert") else ""
+        said = [*words.getvalue().splitlines(), why][0].strip()
         if not said or not said.isprintable() or "\\x" in said or said.startswith("Error"):
             said = MISFIT
         raise NotRead(f"meshio cannot read it ({said[:SAID]})") from None

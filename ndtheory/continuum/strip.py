@@ -231,10 +231,13 @@ def _dominates(ratio: Fraction, pair: tuple[Strip, Strip]) -> bool:
 def everywhere(holds: Callable[[Part], bool], sizes: Sequence[Fraction], *, shortest: Fraction) -> bool:
     """True if something is shown to hold on parts that cover all wave numbers: each is halved until it does.
 
-    A part is halved, too, where its enclosure divides by an interval that contains 0.  False where MOST_PARTS of them
-    leave it open, or one that is as short as a share of its first end, or that lies far beyond all sizes.
+    A part is halved, too, where its enclosure divides by an interval that contains 0.  False where it is not shown at
+    some wave numbers, or MOST_PARTS of them leave it open, or one that is as short as a share of its first end,
+    or that lies far beyond all sizes.
     """
     parts = line(*sizes)
+    if not all(map(holds, _points(parts))):
+        return False
     for _ in range(MOST_PARTS):
         if not parts:
             return True

@@ -45,6 +45,14 @@ def test_a_history_whose_files_are_written_leads_to_its_page(call, quick, write,
     assert suggested(written) == ["explore", str(file), "-o", "page.html"]
 
 
+def test_a_law_that_only_the_global_method_has_here_does_not_lead_to_a_run(call, write):
+    file, sets = write(SMALL), ("--set", "contact.law=local-contact")
+    assert suggested(call("solve", file, *sets))[0] == "run"
+    differ = ("--set", "body2.cells=[7, 2]")
+    assert suggested(call("solve", file, *sets, *differ))[0] == "solve"
+    assert call("run", file, *sets, *differ).status == 2
+
+
 OBSTACLE = """
 [body1]
 shape = "rectangle"
@@ -74,7 +82,8 @@ def test_a_solution_on_an_obstacle_whose_files_are_written_asks_for_no_other_fol
 @pytest.mark.parametrize("command", ["constants", "compare"])
 def test_exchanged_roles_stay_exchanged_in_the_command_that_is_suggested(call, write, command):
     file = write(SMALL)
-    words = suggested(call(command, file, "--swap-roles"))
+    theta = ("--theta", "0.2") if command == "compare" else ()  # with which the run converges
+    words = suggested(call(command, file, "--swap-roles", *theta))
     assert words == [{"constants": "compare", "compare": "advise"}[command], str(file), "--swap-roles"]
 
 

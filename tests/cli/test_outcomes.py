@@ -266,9 +266,11 @@ def test_a_run_with_swapped_roles_advises_options_that_converge(call, write):
 
 
 def test_a_run_that_reached_its_limit_advises_to_raise_it(call, write):
-    answer = call("run", write("inside the theorem"))
-    assert "max_iterations" in answer.err
-    assert answer.err.count("\n") == 1
+    for command in ("run", "compare"):
+        answer = call(command, write("inside the theorem"))
+        assert "max_iterations" in answer.err
+        assert answer.err.count("\n") == 1
+        assert answer.out.splitlines()[-1].startswith("Next: ndtheory run ")
 
 
 @pytest.mark.parametrize("theta", ["0.6", "0.8"])
@@ -298,6 +300,11 @@ def test_bodies_that_never_meet_have_no_contact_force_and_a_solution_that_says_s
     assert "nothing touches: the bodies stay apart along Gamma_c, by at least 0.085 mm" in line
     assert "7 open: nothing touches" in call(command, write("apart")).out
     assert "nothing touches" not in str(call(command, write()))
+
+
+def test_where_nothing_touches_the_forces_of_two_solvers_do_not_differ(call, write):
+    answer = call("compare", write("apart"), "--json")
+    assert answer.document["cvxpy"]["largest_difference"] < 1e-4
 
 
 #: Runs that do not converge, with a word of what stderr says and of what is typed next.

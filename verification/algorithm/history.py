@@ -446,10 +446,12 @@ def march(
 
 def _at_rest(problem: Problem | ContactPair | Path | str) -> tuple[Problem, Problem | ContactPair]:
     """Return a problem with its steps, and the problem or its pair before the first one."""
-    whole = problem.problem if isinstance(problem, ContactPair) else problem
-    if whole is None:
-        raise ValueError("this pair is made from matrices: needed a problem with [[step]] tables")
-    whole = whole if isinstance(whole, Problem) else load(whole)
+    if isinstance(problem, ContactPair):
+        if problem.problem is None:
+            raise ValueError("this pair is made from matrices: needed a problem with [[step]] tables")
+        whole = problem.problem
+    else:
+        whole = problem if isinstance(problem, Problem) else load(problem)
     if not whole.steps:
         raise whole.refuse("step", None, "needed [[step]] tables, one for each step of the loading history")
     rest = at_rest(whole)

@@ -67,7 +67,7 @@ def by_cvxpy_alone(run: Run) -> Reference:
         steps=len(seen),
         whole=True,
         observed_rate=None if rate is None else rate.value,
-        largest_difference=max(_over(error, found.scale) for error, found in zip(errors, seen, strict=True)),
+        largest_difference=max(_over(error, own.scale) for error, own in zip(errors, run.iterates, strict=True)),
         why="" if rate is not None else "fewer than two step ratios are clear of the program's errors",
     )
 

@@ -22,7 +22,9 @@ from verification.output.files import writing
 @click.option("--friction", required=True, metavar="K", help="Coefficient of friction, k > 0.")
 @click.option("--radius", required=True, metavar="R", help="Radius of the hat kernel, in the unit of --depth.")
 @click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1; without it the best one.")
-@click.option("--verified", is_flag=True, help="Prove the numbers in intervals, for every wave number.")
+@click.option(
+    "--verified", is_flag=True, help="Prove the numbers in intervals, for every wave number: ten seconds, or minutes."
+)
 @one_file(".svg", ".png", words="Figure to draw: the plane of theta and k, by factor")
 @JSON
 def layers(
@@ -50,11 +52,18 @@ def layers(
     from verification.document import Document
     from verification.free_norm.two_layers import two_layers
 
+    context = click.get_current_context()
+    for option, words in (("young", young), ("poisson", poisson), ("depth", depth)):
+        if words.count(",") != 1:
+            needed = "needed two numbers with a comma between, of the Neumann layer and of the contact layer"
+            raise click.UsageError(f"--{option} = {words}: {needed}", context)
     E, nu, d = (words.split(",") for words in (young, poisson, depth))
     try:
         found = two_layers(
             young=E, poisson=nu, depth=d, friction=friction, radius=radius, theta=theta, verified=verified
         )
     except HypothesisError as error:
-        raise click.UsageError(f"--{error}", click.get_current_context()) from None
+        names = {"E": "young", "nu": "poisson"}
+        known = HypothesisError(names.get(error.key, error.key), error.value, error.needed)
+        raise click.UsageError(f"--{known}", context) from None
     deliver(found, Document.sections, as_json, writing(target, as_figure), target)

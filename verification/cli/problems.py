@@ -331,6 +331,7 @@ def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:
         return 1
     if outcome in ("stalled", "diverged"):
         return _status_of_run(comparison.run, swapped)
+    complain_of(comparison.run, swapped)
     return 3 if comparison.inconclusive else 0
 
 

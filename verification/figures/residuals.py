@@ -47,7 +47,7 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
         ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}")
         legend_beside(ax)
         if not run.converged:
-            mark_unfinished(ax, run.outcome)
+            mark_unfinished(ax, run.outcome, run.unfinished)
     return figure
 
 

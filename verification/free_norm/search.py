@@ -37,7 +37,7 @@ RATIO = 10**6
 #: How well factors and relaxation factors are known.
 NEAR = 1e-5
 
-#: The program in the norm (5.21) has each so many of the wave numbers.
+#: The program in the norm (5.21) begins with each so many of the wave numbers.
 FEWER = 3
 
 #: The square of the smoothing is at least this, where no alpha would be too large.
@@ -134,28 +134,39 @@ class Search:
         ------
         LMIError
         """
-        found = solve(self._energy_program(theta, k))
+        move, pairs = self._energy_forms(theta, k)
+        some = np.arange(len(move)) % FEWER == 0
+        while True:  # wave numbers join where the multipliers of the others need a larger factor
+            found = solve(self._energy_program(theta, k, move[some], [(a[some], b[some]) for a, b in pairs]))
+            squares = _least_squares(move, pairs, found.y)
+            beside = np.pad(squares, 1, constant_values=-np.inf)
+            top = (squares > (1 + NEAR) * found.s) & (squares >= beside[:-2]) & (squares >= beside[2:]) & ~some
+            if not top.any():
+                break
+            some |= top
         normal, tangential, alpha, beta = found.y
         by = Multipliers(normal=normal / tangential, alpha=k * alpha / tangential, beta=k * beta / tangential)
-        return float(np.sqrt(found.s)), by, float(tangential)
+        return float(np.sqrt(squares.max())), by, float(tangential)
 
-    def _energy_program(self, theta: float, k: float) -> Program:
-        """The program of the least square of the factor, one block of four rows for each wave number.
+    def _energy_forms(self, theta: float, k: float) -> tuple[Floats, list[tuple[Floats, Floats]]]:
+        """T_theta as two rows for each wave number, and the factors of the products that have multipliers.
 
         The coordinates are those in which the energies of g and p are squares of lengths.
         """
-        few = slice(None, None, FEWER)
-        roots = [np.linalg.cholesky(_matrices(form)[few]) for form in (self.neumann, self.contact)]
+        roots = [np.linalg.cholesky(_matrices(form)) for form in (self.neumann, self.contact)]
         L, C = (np.linalg.inv(root.transpose(0, 2, 1)) for root in roots)  # g = L y, p = C z
-        waves, zero = len(L), np.zeros_like(L)
+        zero = np.zeros_like(L)
         force, taken = np.concatenate([zero, C], axis=2), np.concatenate([L, zero], axis=2)
         jump = -np.concatenate([roots[0], roots[1]], axis=2)
-        back = L.transpose(0, 2, 1) @ _matrices(self.neumann)[few]
+        back = L.transpose(0, 2, 1) @ _matrices(self.neumann)
         move = theta * back @ force + (1 - theta) * np.concatenate([np.broadcast_to(np.eye(2), L.shape), zero], axis=2)
         size = np.sqrt(k)
-        zeta, slide = size * np.sqrt(self.smooth[few])[:, None] * taken[:, 1], size * jump[:, 0]
-        pairs = ((force[:, 1], jump[:, 1]), (force[:, 0], jump[:, 0]), (zeta, zeta), (slide, slide))
-        spread = lambda rows: block_diag(*rows[:, None])
+        zeta, slide = size * np.sqrt(self.smooth)[:, None] * taken[:, 1], size * jump[:, 0]
+        return move, [(force[:, 1], jump[:, 1]), (force[:, 0], jump[:, 0]), (zeta, zeta), (slide, slide)]
+
+    def _energy_program(self, theta: float, k: float, move: Floats, pairs: Sequence[tuple[Floats, Floats]]) -> Program:
+        """The program of the least square of the factor, one block of four rows for each wave number."""
+        waves, spread = len(move), lambda rows: block_diag(*rows[:, None])
         left, right = (np.vstack([spread(pair[i]) for pair in pairs]) for i in (0, 1))
         rho = 1 / min(
             np.linalg.eigvals(np.linalg.solve(_matrices(self.neumann), _matrices(self.contact))).real.min(), 1
@@ -179,6 +190,16 @@ class Search:
     def friction_threshold(self) -> float:
         """The friction below which every small theta contracts, and above which none does by this criterion."""
         return self.allowed((0.0, 1.0)).friction
+
+
+def _least_squares(move: Floats, pairs: Sequence[tuple[Floats, Floats]], multipliers: Floats) -> Floats:
+    """For each wave number the least square of a factor that multipliers prove; inf where they prove none."""
+    form = move.transpose(0, 2, 1) @ move
+    for multiplier, (a, b) in zip(multipliers, pairs, strict=True):
+        form += multiplier * (a[:, :, None] * b[:, None] + b[:, :, None] * a[:, None]) / 2
+    own, mixed, rest = form[:, :2, :2], form[:, :2, 2:], -form[:, 2:, 2:]
+    least = np.linalg.eigvalsh(own + mixed @ np.linalg.solve(rest, mixed.transpose(0, 2, 1)))[:, -1]
+    return np.where(np.linalg.eigvalsh(rest)[:, 0] > 0, least, np.inf)
 
 
 def comparable(layers: TwoLayers) -> TwoLayers:

@@ -273,7 +273,7 @@ def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True)
             raise problem.refuse(f"{name}.shape", "rigid", f"{needed}; `ndtheory solve` takes obstacles")
     bodies = discretise(problem, law=law, dense=dense)
     law = bodies.interface.law
-    if law is not None and law.of_contact and not bodies.interface.one_grid:
+    if bodies.interface.only_solved:
         needed = (
             "needed another law on grids that differ: the iteration knows the forces of the Neumann grid, not those of"
             " the contact grid; `ndtheory solve` takes it"

@@ -328,6 +328,11 @@ class Interface(Value):
         return f"{self.contact.n} contact nodes, {'no law of friction' if self.law is None else self.law.words}"
 
     @property
+    def only_solved(self) -> bool:
+        """True if no iteration has this law here: it takes the forces of the contact grid, and the grids differ."""
+        return self.law is not None and self.law.of_contact and not self.one_grid
+
+    @property
     def offset(self) -> Floats:
         """The jump of body 1 against body 2 at which nothing has moved: the slip before the increment, and the gap."""
         return np.concatenate([self.slipped, self.gap])
@@ -342,7 +347,7 @@ class Interface(Value):
         """
         if self.law is None:
             return None
-        if self.law.of_contact and not self.one_grid:
+        if self.only_solved:
             raise ValueError(f"{self.law.words}: no operator on the Neumann grid")
         S = real_array("the operator S", self.operator(self.law), (self.contact.n, self.neumann.n))
         return freeze(S)

@@ -75,5 +75,5 @@ def example(name: str) -> Problem:
     """
     available = examples()
     if name not in available:
-        raise ValueError(unknown_example(name, available))
+        raise ValueError(unknown_example(str(name), available))
     return Problem.from_dict(tomllib.loads(available[name], parse_float=Decimal))

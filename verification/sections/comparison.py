@@ -19,7 +19,7 @@ from verification.sections.answer import answer
 from verification.sections.bounds import bounds, contracts, thetas
 from verification.sections.constants import compared
 from verification.sections.constants import sections as all_constants
-from verification.sections.run import happened
+from verification.sections.run import happened, then
 from verification.sections.setting import limits, setting
 from verification.show.numbers import near_one
 from verification.show.parts import Labelled, Note, Section, Sections, following, outside_the_theorem, section, table
@@ -134,7 +134,9 @@ def verdicts(result: Comparison) -> Sections:
         ("bound", "verdict", "why"), [(NAMES.get(n, n), WORDS[j.verdict], j.reason) for n, j in result.verdicts.items()]
     )
     title = "DOES THE RUN AGREE WITH THE BOUND?"
-    return section("verdicts", title, judged, caption=RATIOS), limits(result.run.outside, following("advise"))
+    return section("verdicts", title, judged, caption=RATIOS), limits(
+        result.run.outside, then(result.run, "run", following("advise"))
+    )
 
 
 @registry.sections.register

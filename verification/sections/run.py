@@ -132,7 +132,8 @@ def solution(found: Solution) -> Sections:
     """The sections of the global method."""
     bodies = found.bodies
     problem = bodies.problem
-    then = following("run") if len(bodies.elastic) == 2 else following("solve", "-o", "results")
+    runs = len(bodies.elastic) == 2 and not bodies.interface.only_solved
+    then = following("run") if runs else following("solve", "-o", "results")
     nodes = Labelled("nodes", _nodes(problem, found.contact))
     parts = (*_grids(problem, problem.contact_body, bodies.interface), nodes, *_contact(problem, found.contact))
     certified = f"KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c"
