@@ -82,7 +82,7 @@ def test_a_solution_on_an_obstacle_whose_files_are_written_asks_for_no_other_fol
 @pytest.mark.parametrize("command", ["constants", "compare"])
 def test_exchanged_roles_stay_exchanged_in_the_command_that_is_suggested(call, write, command):
     file = write(SMALL)
-    theta = ("--theta", "0.2") if command == "compare" else ()  # with which the run converges
+    theta = ("--theta", "0.1") if command == "compare" else ()  # with which the run converges
     words = suggested(call(command, file, "--swap-roles", *theta))
     assert words == [{"constants": "compare", "compare": "advise"}[command], str(file), "--swap-roles"]
 

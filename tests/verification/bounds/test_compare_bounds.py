@@ -1,5 +1,7 @@
 """A comparison of some bounds: the others are left out, and all that takes longer than the run with them."""
 
+from dataclasses import replace
+
 import pytest
 from made_up import Halfway, Slow
 from problem_list import small
@@ -150,3 +152,34 @@ def test_a_bound_on_request_is_worked_out_judged_in_its_norm_and_written_only_th
     without = vf.compare(PROBLEM, bounds=["energy"])
     assert "lyapunov" not in without.to_dict()
     assert "lyapunov" not in without.verdicts
+
+
+# --- what a comparison says beside its bounds -------------------------------------------------------------------------
+
+
+def test_why_no_bound_judges_a_run_by_another_rule_is_said_once():
+    problem = vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.2")
+    accelerated = problem.with_keys({"iteration.relaxation": "aitken"})
+    assert "outside the theorem: " in vf.compare(accelerated, bounds=("energy",)).verdicts["energy"].reason
+    momentum = {"iteration.relaxation": "momentum", "contact.friction": "0"}
+    said = vf.compare(problem.with_keys(momentum), bounds=("energy",)).verdicts["energy"].reason
+    assert "the bounds hold for a constant theta, not for momentum" in said
+    assert "constant theta" not in vf.compare(problem, bounds=("energy",)).verdicts["energy"].reason
+
+
+def test_a_missing_step_ratio_has_its_reason_and_another_one_has_none():
+    problem = vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.2")
+    found = vf.compare(problem, bounds=("energy",))
+    assert found.step_ratio is not None
+    assert "step_ratio" not in found.to_dict()["reason"]
+    closing = {"contact.gap": "0.01499999999999995", "iteration.tolerance": "0.5"}
+    lost = vf.compare(problem.with_keys(closing), bounds=("energy",))
+    assert lost.step_ratio is None
+    assert lost.to_dict()["reason"]["step_ratio"] == "no step is clear of rounding"
+
+
+def test_a_forecast_that_fails_is_no_violated_proof():
+    found = vf.compare(vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.2"), bounds=("energy",))
+    wrong = replace(found.verdicts["energy"], verdict="VIOLATED")
+    assert not replace(found, verdicts=found.verdicts | {"linearised": wrong}).proved_violated
+    assert replace(found, verdicts=found.verdicts | {"energy": wrong}).proved_violated
