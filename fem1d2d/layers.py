@@ -41,9 +41,9 @@ class Layer:
         Width over height of a cell, > 0; MeshError otherwise.
     rising : bool
         True if the diagonal of the cell in column 0 below the surface runs from lower left to upper right.
-    diagonals : {'alternating', 'uniform'}
+    diagonals : {'alternating', 'uniform', 'both'}
         Alternating ones change from each cell to the next, along rows and columns, as those of
-        :func:`fem1d2d.rectangle`.
+        :func:`fem1d2d.rectangle`; of cells that are split by both the nodes in the middle are eliminated.
     rows : int or None
         Rows of cells above a clamped side; None for a half-plane.
     """
@@ -51,7 +51,7 @@ class Layer:
     material: Material
     aspect: float
     rising: bool = True
-    diagonals: Literal["alternating", "uniform"] = "alternating"
+    diagonals: Literal["alternating", "uniform", "both"] = "alternating"
     rows: int | None = None
 
     def __post_init__(self) -> None:
@@ -63,7 +63,23 @@ class Layer:
     @property
     def period(self) -> int:
         """Columns after which the diagonals repeat."""
-        return 1 if self.diagonals == "uniform" else 2
+        return 2 if self.diagonals == "alternating" else 1
+
+    def _cell(self, rising: bool) -> list[tuple[tuple[int, ...], Floats]]:
+        """Stiffness matrices of a cell between some of its corners, counted from the lower left one."""
+        points = [(0.0, 0.0), (self.aspect, 0.0), (self.aspect, 1.0), (0.0, 1.0), (self.aspect / 2, 0.5)]
+        if self.diagonals != "both":
+            halves = [(0, 1, 2), (0, 2, 3)] if rising else [(0, 1, 3), (1, 2, 3)]
+            local = element.stiffness(Cells(points=np.array(points[:4]), cells=np.array(halves)), self.material)
+            return list(zip(halves, local, strict=True))
+        quarters = np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)])
+        whole = np.zeros((5, 2, 5, 2))
+        local = element.stiffness(Cells(points=np.array(points), cells=quarters), self.material)
+        for quarter, matrix in zip(quarters, local, strict=True):
+            whole[np.ix_(quarter, [0, 1], quarter, [0, 1])] += matrix
+        k = whole.reshape(10, 10)
+        rest = k[:8, :8] - k[:8, 8:] @ np.linalg.solve(k[8:, 8:], k[8:, :8])
+        return [((0, 1, 2, 3), rest.reshape(4, 2, 4, 2))]
 
     def row(self, phases: Floats, columns: int) -> Complex:
         """The row of cells below the surface, shape (n, 4 N, 4 N), unit stress.
@@ -85,10 +101,7 @@ class Layer:
         for column in range(columns):
             rising = self.rising ^ bool(shift and column % 2)
             corners = [(0, 0), (1, 0), (1, 1), (0, 1)]  # lower left, lower right, upper right, upper left
-            halves = [(0, 1, 2), (0, 2, 3)] if rising else [(0, 1, 3), (1, 2, 3)]
-            points = np.array([[self.aspect * x, y] for x, y in corners])
-            local = element.stiffness(Cells(points=points, cells=np.array(halves)), self.material)
-            for half, matrix in zip(halves, local, strict=True):
+            for half, matrix in self._cell(rising):
                 at = []
                 for corner in half:
                     right, top = corners[corner]

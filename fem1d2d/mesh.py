@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,8 @@ class Mesh(Cells):
         Boundary facets of each named side: end points in 1D, edges in 2D, each listed once.
     surfaces : mapping from name to int array, shape (m,)
         Numbers of the cells of each named surface; those of two surfaces may be the same.
+    cut : str
+        Cells of a file that were cut into these, in words.
 
     Attributes
     ----------
@@ -73,6 +75,7 @@ class Mesh(Cells):
 
     sides: Mapping[str, Ints]
     surfaces: Mapping[str, Ints] = field(default_factory=dict)
+    cut: str = ""
     boundary: Ints = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -139,7 +142,7 @@ class Mesh(Cells):
 
     def __reduce__(self) -> tuple[Any, ...]:  # a read-only mapping cannot be pickled, and numpy returns writable arrays
         named = {"sides": dict(self.sides), "surfaces": dict(self.surfaces)}
-        return partial(Mesh, points=self.points, cells=self.cells, **named), ()
+        return partial(Mesh, points=self.points, cells=self.cells, cut=self.cut, **named), ()
 
     def split(self, names: Sequence[str]) -> Ints:
         """Return which of these surfaces each cell lies in, shape (c,).
@@ -304,17 +307,26 @@ def interval(x: Sequence[Any], cells: int) -> Mesh:
     )
 
 
-def rectangle_points(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> NDArray[Any]:
+#: How the cells of a rectangle are cut into triangles.
+Split = Literal["alternating", "both"]
+
+
+def rectangle_points(
+    x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int], split: Split = "alternating"
+) -> NDArray[Any]:
     """The nodes of :func:`rectangle`, of the same parameters, shape (n, 2); exact for fractions."""
     axes = [_grid(ends, n) for ends, n in zip((x, y), cells, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    nodes = lambda axes: np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    middles = [(axis[:-1] + axis[1:]) / 2 for axis in axes] if split == "both" else [axis[:0] for axis in axes]
+    return np.concatenate([nodes(axes), nodes(middles)])
 
 
-def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> Mesh:
-    """A rectangle in equal cells, each split into two triangles along alternating diagonals.
+def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int], split: Split = "alternating") -> Mesh:
+    """A rectangle in equal cells, each split into two triangles along alternating diagonals, or into four along both.
 
-    Cell (i, j) is split from its lower left to its upper right corner where i + j is even, along the other
-    diagonal where it is odd.  Nodes are numbered upwards first.  Sides: ``left``, ``right``, ``bottom``, ``top``.
+    Of alternating ones cell (i, j) is split from its lower left to its upper right corner where i + j is even, along
+    the other diagonal where it is odd.  Nodes are numbered upwards first, then the centres of cells that both split.
+    Sides: ``left``, ``right``, ``bottom``, ``top``.
 
     Parameters
     ----------
@@ -322,24 +334,31 @@ def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> Mes
         The ends along x and along y, with units and errors as for :func:`interval`.
     cells : pair of int
         Cells along x and along y.
+    split : {'alternating', 'both'}
 
     Examples
     --------
     >>> mesh = rectangle((0.0, 2.0), (0.0, 1.0), (2, 1))
     >>> len(mesh.points), len(mesh.cells), sorted(mesh.sides)
     (6, 4, ['bottom', 'left', 'right', 'top'])
+    >>> rectangle((0.0, 2.0), (0.0, 1.0), (2, 1), "both").cells.tolist()[:4]
+    [[0, 2, 6], [2, 3, 6], [3, 1, 6], [1, 0, 6]]
     """
     nx, ny = cells
-    points = rectangle_points(x, y, cells)
+    points = rectangle_points(x, y, cells, split)
     node = np.arange((nx + 1) * (ny + 1)).reshape(nx + 1, ny + 1)
     sw, se, nw, ne = node[:-1, :-1], node[1:, :-1], node[:-1, 1:], node[1:, 1:]
     even = (np.add.outer(np.arange(nx), np.arange(ny)) % 2 == 0)[..., None]
     first = np.where(even, np.stack([sw, se, ne], -1), np.stack([sw, se, nw], -1))
     second = np.where(even, np.stack([sw, ne, nw], -1), np.stack([se, ne, nw], -1))
+    triangles = np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
+    if split == "both":
+        middle, around = node.size + np.arange(nx * ny).reshape(nx, ny), pairwise([sw, se, ne, nw, sw])
+        triangles = np.stack([np.stack([a, b, middle], -1) for a, b in around], 2).reshape(-1, 3)
     edge = lambda line: np.column_stack([line[:-1], line[1:]])
     return Mesh(
         points=points,
-        cells=np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)]),
+        cells=triangles,
         sides={"left": edge(node[0]), "right": edge(node[-1]), "bottom": edge(node[:, 0]), "top": edge(node[:, -1])},
     )
 

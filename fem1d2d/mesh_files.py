@@ -1,4 +1,4 @@
-"""Triangle meshes in files: Gmsh and Abaqus, read in a process with limits on memory and time."""
+"""Meshes in files: Gmsh and Abaqus, read in a process with limits on memory and time; all cells become triangles."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,26 +31,38 @@ ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VEC
 PATIENCE = 6
 
 
-def from_file(path: Path | str, *, one_material: bool = True) -> Mesh:
+def from_file(path: Path | str, *, one_material: bool = True, plane: str | None = None) -> Mesh:
     """A triangle mesh from a Gmsh (``.msh``) or Abaqus (``.inp``) file; its sides are the names of its lines.
 
-    A triangle that the file lists clockwise is turned over; points that no triangle uses and names without lines are
-    left out.  Its ``surfaces`` are the named groups of triangles; if these split the mesh it is refused, unless not
+    Quadrilaterals and cells of second order are cut into triangles (:mod:`fem1d2d.mesh_reader`); ``cut`` of the mesh
+    says so.  A cell that the file lists clockwise is turned over; points that no cell uses and names without lines are
+    left out.  Its ``surfaces`` are the named groups of cells; if these split the mesh it is refused, unless not
     ``one_material``.
+
+    Parameters
+    ----------
+    path : path or str
+    one_material : bool
+    plane : {'strain', 'stress'}, optional
+        The plane problem that the mesh is for: elements of Abaqus that are made for the other one are refused.
 
     Raises
     ------
     MeshError
-        Another format, unreadable, beyond the limits on memory and time, no triangles or other cells too, several
-        materials, not plane, no named lines, or no mesh as :class:`Mesh` needs it.
+        Another format, unreadable, beyond the limits on memory and time, no cells of a plane or other ones too, several
+        materials, not plane, no named lines, elements for another plane problem, or no mesh as :class:`Mesh` needs it.
     """
     path = Path(path)
     try:
         _check_kind(path)
-        points, triangles, sides, surfaces, split = read_in_process(path)
-        if split and one_material:
-            raise MeshError(split)
-        return _plane_mesh(points, triangles, sides, surfaces)
+        read = read_in_process(path)
+        if read.split and one_material:
+            raise MeshError(read.split)
+        other = {"strain": "stress", "stress": "strain"}.get(plane or "", "")
+        if other in read.plane:
+            needed = f'needed those of plane {plane}, or the problem with plane = "{other}"'
+            raise MeshError(f"its elements {read.plane[other]} are of plane {other}: {needed}")
+        return _plane_mesh(read.points, read.triangles, read.sides, read.surfaces, read.cut)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
 
@@ -70,8 +84,20 @@ def _check_kind(path: Path) -> None:
         )
 
 
-def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints], dict[str, Ints], str]:
-    """Points, triangles, lines and surfaces of a file, and why they are several materials, from a separate process.
+class Read(NamedTuple):
+    """The contents of a mesh file, as :func:`fem1d2d.mesh_reader.contents` has them."""
+
+    points: Floats
+    triangles: Ints
+    sides: Mapping[str, Ints]
+    surfaces: Mapping[str, Ints] = MappingProxyType({})
+    split: str = ""
+    cut: str = ""
+    plane: Mapping[str, str] = MappingProxyType({})
+
+
+def read_in_process(path: Path) -> Read:
+    """The contents of a file from a separate process.
 
     The process ends when this one does: it waits for the end of its stdin.  Ctrl-C on a terminal does not reach it.
     MeshError if :func:`fem1d2d.mesh_reader.contents` refuses the file, or the process meets a limit or fails.
@@ -108,14 +134,18 @@ def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints], dict[str
     if ended.returncode:
         raise MeshError(f"the process that read it ended with status {ended.returncode}")
     with np.load(io.BytesIO(ended.stdout), allow_pickle=False) as found:
-        lines, surfaces, split = json.loads(found["names"].tobytes())
+        lines, surfaces, *said = json.loads(found["names"].tobytes())
         sides = {name: found[f"lines{i}"] for i, name in enumerate(lines)}
         groups = {name: found[f"surfaces{i}"] for i, name in enumerate(surfaces)}
-        return found["points"], found["triangles"], sides, groups, split
+        return Read(found["points"], found["triangles"], sides, groups, *said)
 
 
 def _plane_mesh(
-    points: Floats, triangles: Ints, sides: Mapping[str, Ints], surfaces: Mapping[str, Ints] | None = None
+    points: Floats,
+    triangles: Ints,
+    sides: Mapping[str, Ints],
+    surfaces: Mapping[str, Ints] | None = None,
+    cut: str = "",
 ) -> Mesh:
     """A mesh of the points in use, its triangles turned anticlockwise."""
     for what, named in (("a triangle", triangles), *((f"side {name!r}", facets) for name, facets in sides.items())):
@@ -141,4 +171,5 @@ def _plane_mesh(
         cells=np.where(flipped[:, None], triangles[:, ::-1], triangles),
         sides={name: number[facets] for name, facets in sides.items()},
         surfaces=surfaces or {},
+        cut=cut,
     )

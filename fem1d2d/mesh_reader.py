@@ -1,6 +1,9 @@
 """Read a mesh file with meshio: a script for a process with limits on memory and time.
 
 :mod:`fem1d2d.mesh_files` runs it by its path, in isolated mode, so it imports nothing of this package.
+
+All cells become linear triangles.  A triangle of second order is cut through its middle nodes into four, a
+quadrilateral by both diagonals, with a node at its centre; one of second order is cut into four of first order before.
 """
 
 from __future__ import annotations
@@ -23,6 +26,59 @@ Ints = NDArray[np.int64]
 
 #: meshio's names of the formats that are read.
 FORMATS = {".msh": "gmsh", ".inp": "abaqus"}
+
+#: Linear triangles of each kind of cell, by its nodes in the order of meshio and by the points that are new, which
+#: follow them; then each new point, as weights of the nodes.
+_QUARTERS = ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))  # of a quadrilateral, its centre last
+_CENTRE = (0.25, 0.25, 0.25, 0.25)
+_SMALL = ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))  # the four in one of second order
+_SERENDIPITY = (-0.25, -0.25, -0.25, -0.25, 0.5, 0.5, 0.5, 0.5)
+
+
+def _of_four(middle: Sequence[float] | None) -> tuple[list[list[int]], list[list[float]]]:
+    """The sixteen triangles of a quadrilateral of second order, whose middle is a node or has these weights."""
+    new = [] if middle is None else [np.array(middle)]
+    nodes = np.eye(9)[:, : 9 - len(new)]
+    nodes[8] = nodes[8] if middle is None else new[0]
+    new += [nodes[list(corners)].mean(axis=0) for corners in _SMALL]
+    cells = [
+        [(*corners, 9 + i)[corner] for corner in quarter] for i, corners in enumerate(_SMALL) for quarter in _QUARTERS
+    ]
+    return cells, [list(map(float, weights)) for weights in new]
+
+
+CUTS: dict[str, tuple[Sequence[Sequence[int]], Sequence[Sequence[float]]]] = {
+    "triangle": (((0, 1, 2),), ()),
+    "triangle6": (((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)), ()),
+    "quad": (_QUARTERS, (_CENTRE,)),
+    "quad8": _of_four(_SERENDIPITY),
+    "quad9": _of_four(None),
+}
+
+#: Kinds of cells of a line, with its linear pieces; and kinds that are no part of the plane and are left out.
+PIECES = {"line": ((0, 1),), "line3": ((0, 2), (2, 1))}
+LEFT_OUT = {"vertex"}
+
+#: Words for cells that were cut.
+CUT = {
+    "triangle6": "triangles of second order",
+    "quad": "quadrilaterals",
+    "quad8": "quadrilaterals of second order",
+    "quad9": "quadrilaterals of second order",
+}
+
+#: Plane elements of Abaqus that meshio does not know, by the letters before the number of their nodes.
+ABAQUS_NODES = {"3": "triangle", "4": "quad", "6": "triangle6", "8": "quad8"}
+ABAQUS_PLANES = {"CPE": "strain", "CPS": "stress", "M3D": "", "S": ""}
+ABAQUS = {
+    f"{start}{nodes}{more}": kind
+    for start in ABAQUS_PLANES
+    for nodes, kind in ABAQUS_NODES.items()
+    for more in ("", "H", "R", "RH", "I", "IH", "M", "MH")
+}
+
+#: Gmsh's numbers of the kinds that are read, and their nodes.
+GMSH_NODES = {15: 1, 1: 2, 8: 3, 2: 3, 9: 6, 3: 4, 16: 8, 10: 9}
 
 #: Sections of an Abaqus file that give an element set its material.
 SECTIONS = ("SOLIDSECTION", "SHELLSECTION", "MEMBRANESECTION")
@@ -51,12 +107,14 @@ def contents(path: Path) -> dict[str, Any]:
     -------
     dict
         ``points`` of shape (n, 2) or (n, 3), ``triangles`` of shape (c, 3), ``lines`` of shape (l, 2) by their names,
-        ``surfaces``, the numbers of their triangles by their names, ``split``, why they are several materials, or "".
+        ``surfaces``, the numbers of their triangles by their names, ``split``, why they are several materials, or "";
+        ``cut``, the cells that were no linear triangles, in words; ``plane``, elements of Abaqus that are of plane
+        strain or stress by these words.
 
     Raises
     ------
     NotRead
-        Unreadable, no triangles or other cells too, or no named lines.
+        Unreadable, no cells of a plane or other ones too, or no named lines.
     """
     try:
         return _contents(path)
@@ -67,23 +125,28 @@ def contents(path: Path) -> dict[str, Any]:
 def _contents(path: Path) -> dict[str, Any]:
     kind = FORMATS[path.suffix.lower()]
     materials: set[str] | None = None
+    planes: dict[str, str] = {}
     if kind == "gmsh":
         with path.open("rb") as file:
             if file.read(11) != b"$MeshFormat":
                 raise NotRead("no Gmsh file: needed $MeshFormat on its first line")
     else:
         try:
-            materials = _abaqus_materials(path)
+            materials, planes = _abaqus_materials(path)
         except UnicodeDecodeError as error:
             raise NotRead(f"needed text in UTF-8: {error.reason}") from None
-    read, triangles, lines, groups = _by_meshio(path, kind)
-    if triangles is None or len(triangles) == 0:
+    read, lines = _by_meshio(path, kind)
+    cells = read.cells_dict
+    plane = [name for name in CUTS if len(cells.get(name, ()))]
+    if not plane:
         remedy = "; give the surface a physical name too" if kind == "gmsh" and lines else ""
-        raise NotRead(f"no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}{remedy}")
-    others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
+        raise NotRead(f"no triangles or quadrilaterals in it, only {', '.join(cells) or 'nothing'}{remedy}")
+    others = sorted(set(cells) - CUTS.keys() - PIECES.keys() - LEFT_OUT)
     if others:
-        raise NotRead(f"needed only triangles, it has {', '.join(others)} too")
-    split = sorted(materials) if materials else _split(read, groups, len(triangles))
+        raise NotRead(f"needed only triangles and quadrilaterals, it has {', '.join(others)} too")
+    points, triangles, parts = _triangles(np.asarray(read.points, dtype=float), {name: cells[name] for name in plane})
+    groups = _surfaces(read, parts)
+    split = sorted(materials) if materials else _split(read, groups, parts, len(triangles))
     why = ""
     if len(split) > 1:
         named = ", ".join(
@@ -102,23 +165,35 @@ def _contents(path: Path) -> dict[str, Any]:
         least = _least_number(path.read_bytes())
         if least < 1:
             raise NotRead(f"an element names node {least}: nodes are numbered from 1")
-    points = np.asarray(read.points, dtype=float)
-    triangles = np.asarray(triangles, dtype=np.int64)
-    return {"points": points, "triangles": triangles, "lines": lines, "surfaces": groups, "split": why}
+    cut = [f"{len(cells[name])} {CUT[name]}" for name in plane if name in CUT]
+    return {
+        "points": points,
+        "triangles": triangles,
+        "lines": lines,
+        "surfaces": groups,
+        "split": why,
+        "cut": " and ".join(cut),
+        "plane": planes,
+    }
 
 
-def _by_meshio(path: Path, kind: str) -> tuple[Any, Any, dict[str, Ints], dict[str, Ints]]:
-    """The mesh, its triangles, its named lines, and the numbers of the triangles of each named group."""
+def _by_meshio(path: Path, kind: str) -> tuple[Any, dict[str, Ints]]:
+    """The mesh, and its named lines."""
     import meshio
 
     words = io.StringIO()  # its readers print, and exit the interpreter on what they cannot read
     try:
         with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numpy's, about what does not parse
+            if kind == "abaqus":
+                meshio.abaqus._abaqus.abaqus_to_meshio_type.update(ABAQUS)
             read = meshio.read(path, file_format=kind)
-            cells = read.cells_dict
-            lines = {name: cells["line"][members] for name, members in _groups(read, "line", 1).items()}
-            return read, cells.get("triangle"), lines, _groups(read, "triangle", 2)
+            lines: dict[str, list[Ints]] = {}
+            for of, pieces in PIECES.items():
+                for name, members in _groups(read, of, 1).items():
+                    rows = read.cells_dict[of][members]
+                    lines.setdefault(name, []).extend(rows[:, list(piece)] for piece in pieces)
+            return read, {name: np.concatenate(rows) for name, rows in lines.items()}
     except MemoryError:
         raise
     except (Exception, SystemExit) as error:
@@ -129,6 +204,35 @@ def _by_meshio(path: Path, kind: str) -> tuple[Any, Any, dict[str, Ints], dict[s
         if not said or not said.isprintable() or "\\x" in said or said.startswith("Error"):
             said = MISFIT
         raise NotRead(f"meshio cannot read it ({said[:SAID]})") from None
+
+
+def _triangles(points: Any, blocks: dict[str, Any]) -> tuple[Any, Ints, dict[str, Ints]]:
+    """Points, linear triangles of cells of several kinds, and the triangles of each cell by its kind, as rows."""
+    triangles, parts, count = [], {}, 0
+    for name, cells in blocks.items():
+        cut, new = CUTS[name]
+        cells = np.asarray(cells, dtype=np.int64)
+        if new:
+            if cells.min() < 0 or cells.max() >= len(points):
+                raise NotRead("a cell names a node that the file does not have")
+            weights = np.array(new)[:, : cells.shape[1]]
+            made = np.einsum("ij,cjk->cik", weights, points[cells])
+            number = len(points) + np.arange(made.shape[0] * made.shape[1]).reshape(made.shape[:2])
+            points = np.concatenate([points, made.reshape(-1, points.shape[1])])
+            cells = np.column_stack([cells, number])
+        triangles.append(cells[:, np.array(cut)].reshape(-1, 3))
+        parts[name] = count + np.arange(len(triangles[-1])).reshape(len(cells), len(cut))
+        count += len(triangles[-1])
+    return points, np.concatenate(triangles), parts
+
+
+def _surfaces(read: Any, parts: dict[str, Ints]) -> dict[str, Ints]:
+    """The numbers of the triangles of each named group of cells."""
+    found: dict[str, list[Ints]] = {}
+    for kind, rows in parts.items():
+        for name, members in _groups(read, kind, 2).items():
+            found.setdefault(name, []).append(rows[members].ravel())
+    return {name: np.concatenate(members) for name, members in found.items()}
 
 
 def _groups(read: Any, kind: str, dimension: int) -> dict[str, Ints]:
@@ -145,7 +249,7 @@ def _groups(read: Any, kind: str, dimension: int) -> dict[str, Ints]:
     return {name: np.asarray(members, dtype=np.int64) for name, members in groups.items() if len(members)}
 
 
-def _split(read: Any, groups: dict[str, Ints], count: int) -> list[str]:
+def _split(read: Any, groups: dict[str, Ints], parts: dict[str, Ints], count: int) -> list[str]:
     """Names of the groups that share the triangles; none if one of them holds all.
 
     Named surfaces of a Gmsh file are materials.  Element sets of an Abaqus file may also be neighbours of a side: they
@@ -159,17 +263,21 @@ def _split(read: Any, groups: dict[str, Ints], count: int) -> list[str]:
         if holds.all():
             return []
     names = sorted(groups)
-    tags = read.cell_data_dict.get("gmsh:physical", {}).get("triangle")
-    if names and tags is not None:
-        names += [f"physical surface {tag}" for tag in sorted({*tags[~covered].tolist()} - {0})]
+    physical = read.cell_data_dict.get("gmsh:physical", {})
+    if names and physical:
+        others = {tag for kind, rows in parts.items() for tag in physical[kind][~covered[rows[:, 0]]].tolist()}
+        names += [f"physical surface {tag}" for tag in sorted(others - {0})]
     elif not covered.all():
         return []
     return names
 
 
-def _abaqus_materials(path: Path) -> set[str]:
-    """Materials of the sections of an Abaqus file; refuses files that meshio would read from elsewhere or mix up."""
-    materials, blocks, lists, keyword = set(), [], [], ""
+def _abaqus_materials(path: Path) -> tuple[set[str], dict[str, str]]:
+    """Materials of the sections of an Abaqus file, and an element type of each plane that its elements name.
+
+    Refuses files that meshio would read from elsewhere or mix up, and elements of another kind of plane.
+    """
+    materials, planes, blocks, lists, keyword = set(), dict[str, str](), [], [], ""
     with path.open(encoding="utf-8") as file:
         for line in file:
             if line.startswith("**") or (keyword != "ELSET" and line.lstrip()[:1].isdigit()):
@@ -188,6 +296,11 @@ def _abaqus_materials(path: Path) -> set[str]:
                 materials.add(given["MATERIAL"].upper())
             elif keyword == "ELEMENT":
                 blocks.append(given.get("ELSET"))
+                of = given.get("TYPE", "").upper()
+                if of.startswith(("CAX", "CGAX")):
+                    raise NotRead(f"its elements {of[:SAID]} are axisymmetric: needed those of plane strain or stress")
+                if plane := next((word for start, word in ABAQUS_PLANES.items() if word and of.startswith(start)), ""):
+                    planes.setdefault(plane, of)
             elif keyword == "ELSET":
                 lists.append(given.get("ELSET"))
     named = [name for name in blocks if name]
@@ -195,17 +308,17 @@ def _abaqus_materials(path: Path) -> set[str]:
         raise NotRead("needed a different ELSET for each *ELEMENT, or for none of them")
     if len(set(lists)) < len(lists):  # meshio keeps the last
         raise NotRead("needed one *ELSET for each name")
-    return materials
+    return materials, planes
 
 
 def _least_number(content: bytes) -> int:
-    """The least node number of points, lines and triangles of a Gmsh text file; meshio counts 0 and below from the end.
+    """The least node number of the cells of a Gmsh text file; meshio counts 0 and below from the end.
 
     1 for the binary variants.
     """
     version, binary = content.split(None, 3)[1:3]
     listed = content.partition(b"$Elements")[2].partition(b"$EndElements")[0]
-    corners, least, at = {15: 1, 1: 2, 2: 3}, 1, 2 if version == b"4.0" else 4
+    corners, least, at = GMSH_NODES, 1, 2 if version == b"4.0" else 4
     if binary == b"1":
         return 1
     if version.startswith(b"2"):  # meshio takes the last numbers of a line for its nodes
@@ -263,7 +376,7 @@ def main(arguments: Sequence[str]) -> int:
     try:
         found = contents(Path(path))
         kinds = ("lines", "surfaces")
-        words = [*(list(found[kind]) for kind in kinds), found["split"]]
+        words = [*(list(found[kind]) for kind in kinds), *(found[word] for word in ("split", "cut", "plane"))]
         names = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
         named = {f"{kind}{i}": members for kind in kinds for i, members in enumerate(found[kind].values())}
         np.savez(out, points=found["points"], triangles=found["triangles"], names=names, **named)

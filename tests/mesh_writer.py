@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 
-from fem1d2d import Mesh, MeshError, from_file, mesh_reader, rectangle
+from fem1d2d import Mesh, MeshError, from_file, mesh_files, mesh_reader, rectangle
 
 
 def write_gmsh22(
@@ -129,10 +129,10 @@ $EndElements
 LINE, CELLS = "1 2 1 1 1 2", ["2 2 9 1 1 2 3", "2 2 9 1 1 3 4"]
 
 
-def read_here(path: Path) -> tuple:
+def read_here(path: Path) -> mesh_files.Read:
     """Stands for `fem1d2d.mesh_files.read_in_process`, without the process: that saves 0.2 s for each file."""
     try:
-        return tuple(mesh_reader.contents(path).values())
+        return mesh_files.Read(*mesh_reader.contents(path).values())
     except mesh_reader.NotRead as error:
         raise MeshError(str(error)) from None
 

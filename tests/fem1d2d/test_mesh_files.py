@@ -165,7 +165,7 @@ def test_rubbish_is_refused_whatever_it_is_called(tmp_path, content, ending):
     path = tmp_path / f"rubbish{ending}"
     path.write_bytes(content)
     with pytest.raises(
-        MeshError, match=r"no Gmsh file|meshio cannot read it|text in UTF-8|no triangles in it|do not fit its format"
+        MeshError, match=r"no Gmsh file|meshio cannot read it|text in UTF-8|no triangles or|do not fit its format"
     ):
         from_file(path)
 
@@ -228,23 +228,15 @@ def test_a_file_in_another_encoding_is_refused(tmp_path):
     refused(path, "needed text in UTF-8")
 
 
-def test_a_file_without_triangles_is_refused_by_what_it_has(tmp_path):
-    more = [("quad", np.array([[0, 1, 2, 3]]))]
-    refused(
-        write(tmp_path / "body.msh", SQUARE, [], {"bottom": [[0, 1]]}, more=more), "no triangles in it, only line, quad"
-    )
+def test_a_file_without_cells_of_a_plane_is_refused_by_what_it_has(tmp_path):
+    path = write(tmp_path / "body.msh", SQUARE, [], {"bottom": [[0, 1]]}, more=[("tetra", np.array([[0, 1, 2, 3]]))])
+    refused(path, "no triangles or quadrilaterals in it, only line, tetra")
 
 
 def test_a_file_without_cells_is_refused(tmp_path):
     path = tmp_path / "body.msh"
     path.write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n")
-    refused(path, "no triangles in it, only nothing")
-
-
-def test_curved_triangles_are_no_triangles(tmp_path):
-    points = np.concatenate([SQUARE[:3], (SQUARE[:3] + np.roll(SQUARE[:3], -1, axis=0)) / 2])
-    more = [("triangle6", np.array([[0, 1, 2, 3, 4, 5]]))]
-    refused(write(tmp_path / "body.msh", points, [], more=more), "no triangles in it, only triangle6")
+    refused(path, "no triangles or quadrilaterals in it, only nothing")
 
 
 def test_points_off_the_plane_are_refused(tmp_path):
@@ -284,11 +276,11 @@ def test_a_flat_triangle_is_refused(tmp_path):
         from_file(path)
 
 
-def test_a_body_partly_of_quadrangles_is_refused_and_not_cut_down_to_its_triangles(tmp_path):
+def test_a_body_partly_of_other_cells_is_refused_and_not_cut_down_to_its_triangles(tmp_path):
     points = np.concatenate([SQUARE, [[2.0, 0.0, 0.0], [2.0, 1.0, 0.0]]])
-    more = [("quad", np.array([[1, 4, 5, 2]]))]
+    more = [("tetra", np.array([[1, 4, 5, 2]]))]
     path = write(tmp_path / "body.msh", points, TRIANGLES, {"bottom": [[0, 1]]}, more=more)
-    refused(path, "needed only triangles, it has quad too")
+    refused(path, "needed only triangles and quadrilaterals, it has tetra too")
 
 
 # --- files whose numbers do not fit together ---
@@ -324,7 +316,7 @@ def written(path, *elements):
         ),
         ([LINE, *CELLS, "2 2 9 1 1 2 " + "7" * 25], "its contents do not fit its format"),
         ([LINE, *CELLS, "99 2 9 1 1 2"], r"meshio cannot read it \(its contents do not fit its format\)"),
-        ([LINE], "no triangles in it, only line; give the surface a physical name too"),
+        ([LINE], "no triangles or quadrilaterals in it, only line; give the surface a physical name too"),
         ([LINE, *("2 3 9 1 1 2 3", "2 3 9 1 1 3 4")], "its contents do not fit its format"),
     ],
 )

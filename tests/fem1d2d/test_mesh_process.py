@@ -216,10 +216,10 @@ def test_threads_read_at_the_same_time(good):
 def test_what_is_read_here_and_there_is_the_same(tmp_path):
     (tmp_path / "body.msh").write_text(GMSH41)
     here = mesh_reader.contents(tmp_path / "body.msh")
-    points, triangles, lines, surfaces, split = mesh_files.read_in_process(tmp_path / "body.msh")
-    assert {name: cells.tolist() for name, cells in surfaces.items()} == {"body": [0, 1]}
-    assert split == here["split"] == ""
-    assert np.array_equal(points, here["points"])
-    assert np.array_equal(triangles, here["triangles"])
-    assert lines.keys() == here["lines"].keys()
-    assert all(np.array_equal(lines[name], facets) for name, facets in here["lines"].items())
+    there = mesh_files.read_in_process(tmp_path / "body.msh")
+    assert {name: cells.tolist() for name, cells in there.surfaces.items()} == {"body": [0, 1]}
+    assert (there.split, there.cut, there.plane) == (here["split"], here["cut"], here["plane"]) == ("", "", {})
+    assert np.array_equal(there.points, here["points"])
+    assert np.array_equal(there.triangles, here["triangles"])
+    assert there.sides.keys() == here["lines"].keys()
+    assert all(np.array_equal(there.sides[name], facets) for name, facets in here["lines"].items())

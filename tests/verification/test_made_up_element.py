@@ -39,7 +39,8 @@ class Rectangles(Element):
         return np.prod(p[:, 2] - p[:, 0], axis=1)[:, None, None] * whole / 36
 
 
-def quadrilaterals(x, y, cells):
+def quadrilaterals(x, y, cells, split="alternating"):
+    assert split == "alternating"
     triangles = rectangle(x, y, cells)
     node = np.arange(len(triangles.points)).reshape(cells[0] + 1, cells[1] + 1)
     quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)

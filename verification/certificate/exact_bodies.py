@@ -124,7 +124,7 @@ def exact_points(spec: BodySpec, body: Body) -> NDArray[Any]:
     assert spec.cells is not None
     if spec.y is None:
         return interval(spec.x, spec.cells[0]).points
-    return rectangle_points(spec.x, spec.y, (spec.cells[0], spec.cells[1]))
+    return rectangle_points(spec.x, spec.y, (spec.cells[0], spec.cells[1]), spec.split)
 
 
 class ExactInterface:

@@ -72,6 +72,8 @@ def rho_of_cells(problem: Problem | None, *, verified: bool = False) -> OfCells:
         return OfCells(numbers=numbers)
     if not interface.matching:
         return OfCells(numbers=numbers, unverified="proved only for columns of cells that face each other")
+    if "both" in (contact.split, neumann.split):
+        return OfCells(numbers=numbers, unverified="proved only for cells that are split by one diagonal")
     proved = _enclosed(interface, contact, neumann)
     return OfCells(numbers={**numbers, **proved.numbers}, unverified=proved.unverified)
 
@@ -140,7 +142,8 @@ def _cell(body: BodySpec) -> tuple[Fraction, Fraction]:
 
 
 def _layer(body: BodySpec, size: tuple[Fraction, Fraction], column: int) -> Layer:
-    return Layer(material=material_of(body), aspect=float(size[0] / size[1]), rising=column % 2 == 1)
+    aspect, rising = float(size[0] / size[1]), column % 2 == 1
+    return Layer(material=material_of(body), aspect=aspect, rising=rising, diagonals=body.split)
 
 
 def _roles(problem: Problem) -> tuple[BodySpec, BodySpec]:

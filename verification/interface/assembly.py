@@ -23,7 +23,7 @@ from fem1d2d import (
     supports,
 )
 from fem1d2d.element import element_of
-from fem1d2d.mesh import Floats, Ints
+from fem1d2d.mesh import Floats, Ints, Split
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
 from verification.interface.body import Body, Name, in_frames, material_of, turning
@@ -242,8 +242,9 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
     if near:
         found.append(
             f"{near}: near 1/2 linear triangles make a body too stiff and scatter the nodal pressures (Hertz on a"
-            f" Delaunay mesh at {LOCKING:g}: 8 %, at 0.475: 13 %); needed a finer mesh, or a mesh file whose"
-            " quadrilaterals are split by both diagonals (0.3 %)"
+            f" Delaunay mesh at {LOCKING:g}: 8 %, at 0.475: 13 %); needed a finer mesh, or"
+            ' quadrilaterals that are split by both diagonals (0.3 %): split = "both" of a rectangle, or a mesh file'
+            " with quadrilaterals"
         )
     if interface.gap.min() < -READING * float(np.ptp(interface.contact.x)):
         j = int(np.argmin(interface.gap))
@@ -387,7 +388,7 @@ def _mesh(problem: Problem, spec: BodySpec, name: str) -> Mesh:
         if why := spec.mesh.unusable():
             raise refuse(why)
         try:
-            mesh = from_file(path, one_material=not spec.materials)
+            mesh = from_file(path, one_material=not spec.materials, plane=problem.plane)
         except MeshError as error:
             raise refuse(str(error).removeprefix(f"{path}: ")) from None
         if spec.materials:
@@ -411,15 +412,17 @@ def _mesh(problem: Problem, spec: BodySpec, name: str) -> Mesh:
         if problem.dimension == 1:
             return interval(x, spec.cells[0])
         assert spec.y is not None
-        mesh = rectangle_of_cells(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
+        mesh = rectangle_of_cells(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]), spec.split)
         return _with_parts(problem, spec, name, mesh)
     except MeshError as error:  # coordinates that no longer differ in doubles
         raise problem.refuse(f"{name}.cells", list(spec.cells), str(error)) from None
 
 
-def rectangle_of_cells(x: tuple[float, float], y: tuple[float, float], cells: tuple[int, int]) -> Mesh:
+def rectangle_of_cells(
+    x: tuple[float, float], y: tuple[float, float], cells: tuple[int, int], split: Split = "alternating"
+) -> Mesh:
     """Return the mesh of a body with ``shape = "rectangle"``: its cells are those of one element."""
-    return rectangle(x, y, cells)
+    return rectangle(x, y, cells, split)
 
 
 def _with_parts(problem: Problem, spec: BodySpec, name: str, mesh: Mesh) -> Mesh:

@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Self
 
+from fem1d2d.mesh import Split
 from ndtheory.keys import Part, key, says
 from ndtheory.moduli import Moduli
 from verification.problem import readers
@@ -230,13 +231,24 @@ class BodySpec(Loads):
         "the same", ends, _needed, "length", initial=None, only=lambda at: at["dimension"] == 2 and _drawn(at)
     )
     cells: tuple[int, ...] | None = entry(
-        "`[along x, along y]`, in one dimension one number; each rectangle is split along alternating diagonals",
+        "`[along x, along y]`, in one dimension one number",
         reader=_cells,
         initial=None,
         only=lambda at: _elastic(at) and _drawn(at),
         write=lambda body: body.cells if body.shape == "rectangle" else body.cells and body.cells[0],
         type="free",
         unit="1",
+    )
+    split: Split = entry(
+        "`both` diagonals split each cell of a rectangle into four triangles, which do not lock near "
+        r"$\nu = 1/2$; or `alternating` ones",
+        choice("alternating", "both"),
+        "alternating",
+        initial="alternating",
+        only=lambda at: at["dimension"] == 2 and _elastic(at) and _drawn(at),
+        write=lambda body: body.split if body.shape == "rectangle" else None,
+        later=True,
+        absent="with a mesh file, of an obstacle and in one dimension",
     )
     mesh: MeshFile | None = entry(
         "a triangle mesh file instead of `shape`, `x`, `y` and `cells`; its sides are its named lines."

@@ -46,9 +46,10 @@ def sections(finished: Run) -> Sections:
     """The sections; none of a run on matrices without a problem."""
     if finished.problem is None:
         return ()
-    nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
+    meshes = [body.mesh for body in finished.bodies.elastic]
+    nodes = sum(len(mesh.points) for mesh in meshes)
     return (
-        setting(finished.problem.with_theta(finished.theta), nodes, finished.pair.contact.grid.n),
+        setting(finished.problem.with_theta(finished.theta), nodes, finished.pair.contact.grid.n, meshes),
         happened(finished, alone=True),
         limits(finished.outside, then(finished, "run", following("compare", iteration=True))),
     )
@@ -130,7 +131,7 @@ def _at_the_end(finished: Run) -> str:
 @registry.sections.register
 def solution(found: Solution) -> Sections:
     """The sections of the global method."""
-    bodies = found.bodies
+    bodies, meshes = found.bodies, [body.mesh for body in found.bodies.elastic]
     problem = bodies.problem
     runs = len(bodies.elastic) == 2 and not bodies.interface.only_solved
     then = following("run") if runs else following("solve", "-o", "results")
@@ -138,7 +139,7 @@ def solution(found: Solution) -> Sections:
     parts = (*_grids(problem, problem.contact_body, bodies.interface), nodes, *_contact(problem, found.contact))
     certified = f"KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c"
     return (
-        setting(problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n),
+        setting(problem, sum(len(mesh.points) for mesh in meshes), bodies.interface.contact.n, meshes),
         section("solution", "WHAT IS THE SOLUTION?", *parts, certified),
         limits(bodies.outside, then),
     )

@@ -125,6 +125,7 @@ def test_the_dictionary_of_section_6_is_the_one_of_its_file():
         "x": [0.4, 1.6],
         "y": [0, 0.3],
         "cells": [24, 6],
+        "split": "alternating",
         "young": 20000,
         "poisson": 0.3,
         "prescribed": {"top": [0, -0.015]},
