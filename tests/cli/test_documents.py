@@ -317,6 +317,8 @@ def test_the_calculator_says_where_M_is_no_sum_and_the_theorem_as_printed_conclu
     given = ["bounds", "--m", m, "--CR", "1", "--CK", "1e-4", "--theta", "1/5", "--M"]
     less, enough = (call(*given, M, "--json").document["editions"] for M in (m, str(2 * Fraction(m))))
     assert "M < 2 m: no two bodies have that" in call(*given, m).out
+    assert call(*given, m, "--json").err.startswith("warning: M < 2 m: no two bodies have that")
+    assert "M < 2 m" not in str(call(*given, str(2 * Fraction(m)), "--json"))
     assert "M < 2 m" not in call(*given, str(2 * Fraction(m))).out
     assert enough["printed"]["verdict"] == less["repaired"]["verdict"] == "contraction"
     assert less["printed"]["verdict"] == ("no conclusion" if m == "1/10" else "contraction")

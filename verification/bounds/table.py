@@ -235,6 +235,13 @@ class Calculated(Document):
     results: Mapping[str, BoundResult] = key(name="editions", inside=BY_NAME)
 
     @property
+    def no_sum(self) -> str:
+        """The remark where no two bodies have these m and M; empty elsewhere."""
+        given = self.constants
+        less = given is not None and 2 * given.m > given.M
+        return "M < 2 m: no two bodies have that, as M is the sum M^1 + M^2 (4.2)" if less else ""
+
+    @property
     @says(inside=INPUTS)
     def inputs(self) -> dict[str, Any]:
         """The constants that were given, and theta."""

@@ -12,7 +12,7 @@ from ndtheory import EDITIONS, Constants, EnergyConstants, HypothesisError
 from ndtheory.constants import take
 from verification.bounds.bound import NOT_ASKED, Subject
 from verification.bounds.table import ENERGY, SECTION_5, Calculated
-from verification.cli.console import as_figure, deliver
+from verification.cli.console import as_figure, complain, deliver
 from verification.cli.forms import cli
 from verification.cli.options import JSON, OneOf, one_file
 from verification.output.files import writing
@@ -90,6 +90,8 @@ def bounds(
             left_out = bound.edition is not None and constants is not None and edition not in (name, "both")
             results[name] = bound.absent(NOT_ASKED) if left_out else bound.evaluate(subject, theta)
     found = Calculated(constants=constants, energy=energy, theta=theta, results=results)
+    if as_json and found.no_sum:  # which the screen says itself
+        complain(f"warning: {found.no_sum}")
     deliver(found, sections, as_json, writing(target, as_figure), target)
     proved = any(result.factor is not None and result.proved for result in results.values())
     return 1 if check and not proved else 0

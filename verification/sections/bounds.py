@@ -87,8 +87,8 @@ def sections(found: Calculated) -> Sections:
     if (given := found.constants) is not None:
         values = ", ".join(f"{key} = {figures(float(getattr(given, key)))}" for key in ("m", "M", "C_R", "C_K"))
         facts.append(values + ("" if given.k is None else f" (k = {figures(float(given.k))})"))
-        if 2 * given.m > given.M:
-            facts.append("M < 2 m: no two bodies have that, as M is the sum M^1 + M^2 (4.2)")
+        if found.no_sum:
+            facts.append(found.no_sum)
     if (energy := found.energy) is not None:
         keys = ("rho", "kappa_1", "kappa_2")
         facts.append(", ".join(f"{key} = {figures(float(getattr(energy, key)))}" for key in keys))

@@ -5,6 +5,8 @@ The other path solves with the sparse matrix for each unknown of the interface.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import meshio
 import numpy as np
 import pytest
@@ -155,3 +157,43 @@ def test_the_global_method_factorises_each_body_once_its_displacements_included(
     assert found.checks.largest_strain > 0
     held, loose = found.bodies.elastic
     assert sizes == [len(held.positions), len(loose.positions) - 3]
+
+
+# --- directions, and what makes two bodies the same -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("neumann", [1, 2])
+def test_a_form_is_oriented_as_the_vectors_that_it_takes(neumann):
+    pair = vf.build(vf.Problem.from_dict(blocks(iteration={"neumann_body": neumann})))
+    random = np.random.default_rng(0)
+    for side in (pair.contact, pair.neumann):
+        size = len(side.load)
+        M = random.standard_normal((size, size))
+        M, x, y = M + M.T, *random.standard_normal((2, size))
+        assert x @ side.orient_form(M) @ y == pytest.approx(side.orient(x) @ M @ side.orient(y))
+    assert pair.contact.upward == pair.neumann.upward == (neumann == 2)  # so that vectors are turned in one case
+
+
+def test_a_known_displacement_is_taken_along_the_tangent_and_the_normal_of_each_contact_node():
+    """A body on rollers along its whole left side, whose contact line is turned: components of one vector."""
+    body = discretise(
+        vf.Problem.from_dict(blocks(body1={"prescribed": {"left": ["1/100", "free"]}, "fixed": []}))
+    ).body1
+    angle = np.linspace(-0.3, 0.4, len(body.nodes))
+    turned = replace(body, normals=np.column_stack([np.sin(angle), np.cos(angle)]))
+    values = body.known.values[body.nodes]
+    assert values[:, 0].any()
+    along = values[:, 0] * np.cos(angle) - values[:, 1] * np.sin(angle)
+    across = values[:, 0] * np.sin(angle) + values[:, 1] * np.cos(angle)
+    assert turned.known_trace == pytest.approx(np.concatenate([along, across]))
+
+
+def test_a_body_under_other_loads_or_with_another_norm_is_another_one():
+    data = blocks()
+    body = discretise(vf.Problem.from_dict(data)).body2
+    same, loaded = (
+        discretise(vf.Problem.from_dict(changed(data, body2=more))).body2 for more in ({}, {"body_force": [0, -1]})
+    )
+    moved = discretise(vf.Problem.from_dict(changed(data, body2={"prescribed": {"top": [0, "-1/40"]}}))).body2
+    assert body.equals(same)
+    assert not any(body.equals(other) for other in (loaded, moved, replace(body, length=2 * body.length)))

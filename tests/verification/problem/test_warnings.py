@@ -331,3 +331,19 @@ def test_the_page_says_that_the_error_after_unloading_depends_on_the_mesh():
     told = re.search(r"`section6-666` the largest error is (\d+) %", ONE_LINE)
     off, _ = off_after_unloading("section6-666")
     assert f"{100 * off.max():.0f}" == told[1]
+
+
+def test_a_bound_of_the_local_law_is_warned_of_beyond_a_tenth_and_at_closed_nodes_alone():
+    data = changed(plates(), contact={"law": "local"}, body2={"cells": [7, 3]})
+    interface = vf.build(vf.Problem.from_dict(data)).interface
+    assert not interface.one_grid
+    pressure = np.linspace(1.0, 2.0, interface.contact.n)
+    pressure[0] = 0.0
+    of = lambda shares: interface.law.warnings_after(interface, 0.2, pressure, 0.2 * pressure * shares)
+    ones = np.ones(len(pressure))
+    assert of(ones) == []
+    assert of(np.where(np.arange(len(ones)) == 3, 1.09, 0.92)) == []
+    (said,) = of(np.where(np.arange(len(ones)) == 3, 1.2, 0.8))
+    assert "0.8 to 1.2 times k times their pressure" in said
+    pressure[:] = 0.0
+    assert of(ones) == []
