@@ -11,7 +11,6 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from fem1d2d.mesh import Split
 from ndtheory.keys import Part, key, says
 from ndtheory.moduli import Moduli
 from verification.problem import readers
@@ -239,7 +238,7 @@ class BodySpec(Loads):
         type="free",
         unit="1",
     )
-    split: Split = entry(
+    split: Literal["alternating", "both"] = entry(
         "`both` diagonals split each cell of a rectangle into four triangles, which do not lock near "
         r"$\nu = 1/2$; or `alternating` ones",
         choice("alternating", "both"),
