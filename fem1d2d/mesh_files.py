@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fem1d2d import mesh_reader
-from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, measures
+from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, edges, measures, undirected
 
 #: Limits of the process that reads: seconds of processor time and bytes of memory, at least and for each byte of the
 #: file up to MOST_BYTES.  Half a million triangles in 36 MB take 5 s and 0.3 GB.
@@ -31,7 +31,9 @@ ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VEC
 PATIENCE = 6
 
 
-def from_file(path: Path | str, *, one_material: bool = True, plane: str | None = None) -> Mesh:
+def from_file(
+    path: Path | str, *, one_material: bool = True, plane: str | None = None, group: Sequence[str] = ()
+) -> Mesh:
     """A triangle mesh from a Gmsh (``.msh``) or Abaqus (``.inp``) file; its sides are the names of its lines.
 
     Quadrilaterals and cells of second order are cut into triangles (:mod:`fem1d2d.mesh_reader`); ``cut`` of the mesh
@@ -45,17 +47,21 @@ def from_file(path: Path | str, *, one_material: bool = True, plane: str | None 
     one_material : bool
     plane : {'strain', 'stress'}, optional
         The plane problem that the mesh is for: elements of Abaqus that are made for the other one are refused.
+    group : sequence of str, optional
+        Named surfaces that are the mesh, of a file that holds several bodies.  Of its sides the parts on their outline
+        are left, also where another body begins.
 
     Raises
     ------
     MeshError
         Another format, unreadable, beyond the limits on memory and time, no cells of a plane or other ones too, several
-        materials, not plane, no named lines, elements for another plane problem, or no mesh as :class:`Mesh` needs it.
+        materials, not plane, no named lines, elements for another plane problem, a surface that the file does not name,
+        or no mesh as :class:`Mesh` needs it.
     """
     path = Path(path)
     try:
         _check_kind(path)
-        read = read_in_process(path)
+        read = _of_group(read_in_process(path), group)
         if read.split and one_material:
             raise MeshError(read.split)
         other = {"strain": "stress", "stress": "strain"}.get(plane or "", "")
@@ -138,6 +144,28 @@ def read_in_process(path: Path) -> Read:
         sides = {name: found[f"lines{i}"] for i, name in enumerate(lines)}
         groups = {name: found[f"surfaces{i}"] for i, name in enumerate(surfaces)}
         return Read(found["points"], found["triangles"], sides, groups, *said)
+
+
+def _of_group(read: Read, group: Sequence[str]) -> Read:
+    """The part of a file that some of its named surfaces make; all of it where none are named."""
+    if not group:
+        return read
+    if unknown := [name for name in group if name not in read.surfaces]:
+        named = ", ".join(read.surfaces) or "none"
+        raise MeshError(f"no surface {unknown[0]!r}; needed names of surfaces (element sets) in it: {named[:200]}")
+    chosen = np.unique(np.concatenate([read.surfaces[name] for name in group]))
+    triangles, count = read.triangles[chosen], len(read.points)
+    codes, times = np.unique(undirected(edges(triangles), count), return_counts=True)
+    outline = codes[times == 1]
+    sides = {name: facets[np.isin(undirected(facets, count), outline)] for name, facets in read.sides.items()}
+    own = {name: np.flatnonzero(np.isin(chosen, members)) for name, members in read.surfaces.items()}
+    return read._replace(
+        triangles=triangles,
+        sides={name: facets for name, facets in sides.items() if len(facets)},
+        surfaces={name: members for name, members in own.items() if len(members)},
+        split="",
+        cut=f"the file's {read.cut}" if read.cut else "",
+    )
 
 
 def _plane_mesh(

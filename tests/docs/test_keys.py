@@ -158,12 +158,13 @@ def small(folder: Path) -> vf.Problem:
 
 
 def triangles(path: Path) -> None:
-    """A unit square of two triangles below the x axis, with a named bottom."""
+    """A unit square of two triangles below the x axis, with a named bottom and a named surface."""
     points = [(0, -1, 0), (1, -1, 0), (1, 0, 0), (0, 0, 0)]
     cells = [("line", [[0, 1]]), ("triangle", [[0, 1, 2], [0, 2, 3]])]
     tags = [np.array([1]), np.array([9, 9])]
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    mesh = meshio.Mesh(np.array(points, float), cells, cell_data=data, field_data={"bottom": np.array([1, 1])})
+    names = {"bottom": np.array([1, 1]), "square": np.array([9, 2])}
+    mesh = meshio.Mesh(np.array(points, float), cells, cell_data=data, field_data=names)
     meshio.write(path, mesh, file_format="gmsh22", binary=False)
 
 
@@ -257,7 +258,8 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
     above = {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [1, 1], "young": 1, "poisson": "0.3"}
     of_mesh = vf.Problem.from_dict(
         {
-            "body1": {"mesh": str(folder / "square.msh"), "young": 1, "poisson": "0.3", "fixed": ["bottom"]},
+            "body1": {"mesh": str(folder / "square.msh"), "young": 1, "poisson": "0.3", "fixed": ["bottom"]}
+            | {"group": "square"},
             "body2": {**above, "prescribed": {"all": [0, "-0.1"]}, "traction": {"right": [0, 1]}}
             | {"parts": {"all": {"side": "top", "x": [0, 1]}, "edge": {"side": "left", "y": [0, 1]}}},
             "contact": {"interval": [0, 1]},

@@ -388,7 +388,7 @@ def _mesh(problem: Problem, spec: BodySpec, name: str) -> Mesh:
         if why := spec.mesh.unusable():
             raise refuse(why)
         try:
-            mesh = from_file(path, one_material=not spec.materials, plane=problem.plane)
+            mesh = from_file(path, one_material=not spec.materials, plane=problem.plane, group=spec.group)
         except MeshError as error:
             raise refuse(str(error).removeprefix(f"{path}: ")) from None
         if spec.materials:

@@ -174,6 +174,16 @@ def side_list(value: Any, at: At) -> tuple[str, ...]:
     return tuple(value)
 
 
+def groups(value: Any) -> tuple[str, ...]:
+    """Read the name of a group of cells, or a list of some."""
+    names = [value] if isinstance(value, str) else value
+    if not isinstance(names, (list, tuple)) or not names or not all(isinstance(name, str) for name in names):
+        raise Unfit('needed a name of a surface in quotes, or a list of some, as ["left", "wing"]')
+    if len(set(names)) < len(names):
+        raise Unfit("needed each surface once")
+    return tuple(map(label, names))
+
+
 def two_bodies(value: Any, at: At) -> tuple[int, int]:
     """Read the numbers of two bodies that touch each other."""
     needed = f"two different numbers of bodies, of {', '.join(map(str, at['numbers']))}"

@@ -257,6 +257,16 @@ class BodySpec(Loads):
         initial=None,
         counts=lambda mesh: mesh and mesh.sha256,
     )
+    group: tuple[str, ...] = entry(
+        'the named surfaces (`Physical Surface` of Gmsh, element sets of Abaqus) that make this body, as `"left"` or '
+        '`["left", "wing"]`, where a mesh file holds several bodies',
+        readers.groups,
+        (),
+        initial=(),
+        only=lambda at: at["shape"] == "mesh",
+        later=True,
+        absent="without a mesh file",
+    )
     young: Fraction = entry(
         "$E > 0$; with a mesh file also a table by its named surfaces",
         reader=lambda value, at: readers.by_surface(value, at, positive),
