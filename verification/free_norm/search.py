@@ -188,7 +188,7 @@ class Search:
 
     @property
     def friction_threshold(self) -> float:
-        """The friction below which every small theta contracts, and above which none does by this criterion."""
+        """The friction below which every small theta contracts, and above which the search finds none that does."""
         return self.allowed((0.0, 1.0)).friction
 
 

@@ -52,7 +52,7 @@ def _contracts(role: LayersRole) -> str:
         return f"Neumann body {role.neumann}: no theta is found to contract at this friction."
     free, energy = role.lyapunov.factor, role.energy.factor
     inside = "no norm is found in which it contracts" if free is None else f"a step contracts by {at_most(free)}"
-    plain = "no factor is found"
+    plain = "the search finds no factor"
     if energy is not None:
         plain = f"the factor is {at_most(energy)}{', no contraction' * (energy.value >= 1)}"
     return f"Neumann body {role.neumann}, theta = {role.theta:g}: {inside}; in the norm (5.21) {plain}."

@@ -146,14 +146,16 @@ def solution(found: Solution) -> Sections:
 
 
 def _grids(problem: Problem, contact_body: int, interface: Interface) -> list[Shown]:
-    """The body that carries the contact grid, if there are two grids."""
+    """The ends of Gamma_c that are read as planes of symmetry, and the body that carries the contact grid, if any."""
+    ends = " and ".join(interface.contact.place(j) for j, plane in enumerate(interface.planes[0]) if plane)
+    found: list[Shown] = [Labelled("symmetry", f"half of a whole: a plane of symmetry at {ends}")] if ends else []
     if interface.one_grid:
-        return []
+        return found
     own, other = f"the {PLACES[contact_body]} body", f"the {PLACES[3 - contact_body]}"
     if interface.contact.normals is not None:  # either body may lie above
         own, other = problem.words(contact_body), problem.words(3 - contact_body)
     counts = f"{interface.contact.n} nodes of {own}, Neumann grid: {interface.neumann.n} of {other}"
-    return [Labelled("contact grid", counts)]
+    return [*found, Labelled("contact grid", counts)]
 
 
 def _nodes(problem: Problem, contact: ContactFields) -> str:

@@ -8,6 +8,7 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 from mesh_writer import write_gmsh22
+from problem_list import PROBLEMS
 from scipy.linalg import eigh
 
 import verification as vf
@@ -267,3 +268,10 @@ def test_a_support_of_the_contact_body_alone_carries_the_shear_there_and_the_sli
         assert "a contact node of body 1 is held tangentially" in outside[0]
         assert "supports on both bodies" in outside[0]
     assert vf.measure(problem).rho_max is not None
+
+
+def test_the_screen_says_where_an_end_is_read_as_a_plane_of_symmetry():
+    half, whole = (vf.Problem.from_dict(PROBLEMS[name]) for name in ("half of a symmetric model", "section 6"))
+    for found in (vf.run, vf.solve):
+        assert "half of a whole: a plane of symmetry at x = 0" in str(found(half).sections())
+        assert "symmetry" not in str(found(whole).sections())
