@@ -23,7 +23,7 @@ MISSION: dict[str, tuple[str, ...]] = {
         "fem1d2d/condense": "flexibility condense uncoupled few_unknowns",
         "fem1d2d/element": "element strain assembly material",
         "fem1d2d/line": "line lines",
-        "fem1d2d/mesh": "mesh overlap supports outline",
+        "fem1d2d/mesh": "mesh overlap supports outline crossed_cells",
         "fem1d2d/pencil": "bars refinement pencil",
         "fem1d2d/supports": "supports refinement",
         "fem1d2d/trace": "transfer trace",

@@ -246,7 +246,7 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
         if bare.explodes:
             least = (1 + ratio.least) / theta - 1
             why = f"2/(2 + rho) with rho = {few(least)}, the least one whose residual grows so fast"
-            following = NextRun(theta=rounded_down(predicted_theta(least)), why=why)
+            following = NextRun(theta=max(rounded_down(predicted_theta(least)), float(SMALLEST_THETA)), why=why)
     elif plateau is not None:
         readings, following = read_plateau(theta, plateau)
         if (other := bare.rho_elsewise) is not None:
@@ -343,6 +343,8 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Deci
     else:
         base = next((log for log in logs if log.readings), logs[0])
     if interval.contradiction is not None:
+        if kind.linear and falling:
+            return base.readings, _falls_fastest(falling, "the logs contradict each other"), None
         why = "half of the smallest theta, in one time window, with ResAbs in the log: the logs contradict each other"
         return base.readings, NextRun(theta=_half(logs), why=why), None
     lo, hi, tied = interval.lo, interval.hi, kind.linear
@@ -405,9 +407,8 @@ def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, kind:
             return None
         why = "no linear coupling with real eigenvalues has all of these logs: a coupling with convection, one that is "
         why += "not linear, or leave out tied"
-        falling = [(log.slowest.most, log.theta) for log in logs if log.converges and log.slowest is not None]
-        if falling:
-            return base.readings, kept(min(falling)[1], f"it falls fastest; {why}"), None
+        if falling := [log for log in logs if log.converges]:
+            return base.readings, _falls_fastest(falling, why), None
         return base.readings, NextRun(theta=_half(logs), why=f"half of the smallest theta; {why}"), None
     if math.isinf(stiffest := max(box.b[1] for box in boxes)):
         return None
@@ -442,6 +443,12 @@ def cost_in_words(boxes: Sequence[Box], dear: float, kind: Kind) -> str:
         f"as the logs leave them{kind.given(' where contact does not change')}, with {ends.FEWEST_MODES} modes or more"
     )
     return f"{times} if {ends_in_words(boxes)}, {where}"
+
+
+def _falls_fastest(falling: Sequence[SeenLog], why: str) -> NextRun:
+    """Keep the theta of the log that falls fastest."""
+    _, theta = min((log.slowest.most, log.theta) for log in falling if log.slowest is not None)
+    return kept(theta, f"it falls fastest; {why}")
 
 
 def _half(logs: Sequence[SeenLog]) -> float:
