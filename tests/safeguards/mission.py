@@ -53,7 +53,7 @@ MISSION: dict[str, tuple[str, ...]] = {
         "verification/contact/system": "global few_unknowns lines history",
         "verification/interface/body": "response few_unknowns constants cattaneo materials held_by_contact",
         "verification/interface/friction": "warnings build grids",
-        "verification/interface/interface": "build grids conformance symmetry lines varying_friction",
+        "verification/interface/interface": "build grids conformance symmetry lines varying_friction jacobian",
         "verification/interface/joining": "joining drawn_geometry lines drawn_bodies",
         "verification/interface/pair": "build relaxation constants global varying_friction",
         "verification/algorithm/monolithic": "global checks drawn_geometry held_by_contact",

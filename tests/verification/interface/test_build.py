@@ -345,3 +345,11 @@ def test_what_is_no_problem_is_refused_by_every_function_that_takes_one(given):
     for take in (vf.solve, vf.run, vf.measure, vf.advise, vf.compare, vf.march, vf.sweep, vf.certify):
         with pytest.raises(ValueError, match="needed a problem"):
             take(given)
+
+
+def test_a_pair_of_matrices_has_no_problem_to_change():
+    pair = vf.build(S1=np.diag([2.0, 3.0]), S2=np.eye(2), x=np.zeros(1))
+    with pytest.raises(ValueError, match="made from matrices"):
+        pair.changed(young=(1, 2))
+    made = vf.build(vf.example("section6-60"))
+    assert made.changed(young=(1, 2)).problem.body2.young == 2

@@ -180,9 +180,11 @@ def test_a_known_displacement_is_taken_along_the_tangent_and_the_normal_of_each_
         vf.Problem.from_dict(blocks(body1={"prescribed": {"left": ["1/100", "free"]}, "fixed": []}))
     ).body1
     angle = np.linspace(-0.3, 0.4, len(body.nodes))
-    turned = replace(body, normals=np.column_stack([np.sin(angle), np.cos(angle)]))
-    values = body.known.values[body.nodes]
-    assert values[:, 0].any()
+    values = np.random.default_rng(0).standard_normal((len(body.nodes), 2))
+    everywhere = body.known.values.copy()
+    everywhere[body.nodes] = values
+    known = replace(body.known, values=everywhere)
+    turned = replace(body, normals=np.column_stack([np.sin(angle), np.cos(angle)]), known=known)
     along = values[:, 0] * np.cos(angle) - values[:, 1] * np.sin(angle)
     across = values[:, 0] * np.sin(angle) + values[:, 1] * np.cos(angle)
     assert turned.known_trace == pytest.approx(np.concatenate([along, across]))

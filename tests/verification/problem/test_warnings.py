@@ -345,5 +345,7 @@ def test_a_bound_of_the_local_law_is_warned_of_beyond_a_tenth_and_at_closed_node
     assert of(np.where(np.arange(len(ones)) == 3, 1.09, 0.92)) == []
     (said,) = of(np.where(np.arange(len(ones)) == 3, 1.2, 0.8))
     assert "0.8 to 1.2 times k times their pressure" in said
+    pressure *= 1e-9  # in another unit
+    assert of(np.where(np.arange(len(ones)) == 3, 1.2, 0.8)) == [said]
     pressure[:] = 0.0
     assert of(ones) == []
