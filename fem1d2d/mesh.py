@@ -348,13 +348,14 @@ def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int], split:
     points = rectangle_points(x, y, cells, split)
     node = np.arange((nx + 1) * (ny + 1)).reshape(nx + 1, ny + 1)
     sw, se, nw, ne = node[:-1, :-1], node[1:, :-1], node[:-1, 1:], node[1:, 1:]
-    even = (np.add.outer(np.arange(nx), np.arange(ny)) % 2 == 0)[..., None]
-    first = np.where(even, np.stack([sw, se, ne], -1), np.stack([sw, se, nw], -1))
-    second = np.where(even, np.stack([sw, ne, nw], -1), np.stack([se, ne, nw], -1))
-    triangles = np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
     if split == "both":
         middle, around = node.size + np.arange(nx * ny).reshape(nx, ny), pairwise([sw, se, ne, nw, sw])
         triangles = np.stack([np.stack([a, b, middle], -1) for a, b in around], 2).reshape(-1, 3)
+    else:
+        even = (np.add.outer(np.arange(nx), np.arange(ny)) % 2 == 0)[..., None]
+        first = np.where(even, np.stack([sw, se, ne], -1), np.stack([sw, se, nw], -1))
+        second = np.where(even, np.stack([sw, ne, nw], -1), np.stack([se, ne, nw], -1))
+        triangles = np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)])
     edge = lambda line: np.column_stack([line[:-1], line[1:]])
     return Mesh(
         points=points,

@@ -10,7 +10,6 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +67,7 @@ def from_file(
         if other in read.plane:
             needed = f'needed those of plane {plane}, or the problem with plane = "{other}"'
             raise MeshError(f"its elements {read.plane[other]} are of plane {other}: {needed}")
-        return _plane_mesh(read.points, read.triangles, read.sides, read.surfaces, read.cut)
+        return _plane_mesh(read)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
 
@@ -96,10 +95,10 @@ class Read(NamedTuple):
     points: Floats
     triangles: Ints
     sides: Mapping[str, Ints]
-    surfaces: Mapping[str, Ints] = MappingProxyType({})
-    split: str = ""
-    cut: str = ""
-    plane: Mapping[str, str] = MappingProxyType({})
+    surfaces: Mapping[str, Ints]
+    split: str
+    cut: str
+    plane: Mapping[str, str]
 
 
 def read_in_process(path: Path) -> Read:
@@ -168,14 +167,9 @@ def _of_group(read: Read, group: Sequence[str]) -> Read:
     )
 
 
-def _plane_mesh(
-    points: Floats,
-    triangles: Ints,
-    sides: Mapping[str, Ints],
-    surfaces: Mapping[str, Ints] | None = None,
-    cut: str = "",
-) -> Mesh:
+def _plane_mesh(read: Read) -> Mesh:
     """A mesh of the points in use, its triangles turned anticlockwise."""
+    points, triangles, sides = read.points, read.triangles, read.sides
     for what, named in (("a triangle", triangles), *((f"side {name!r}", facets) for name, facets in sides.items())):
         outside = named[(named < 0) | (named >= len(points))]
         if len(outside):
@@ -198,6 +192,6 @@ def _plane_mesh(
         points=points,
         cells=np.where(flipped[:, None], triangles[:, ::-1], triangles),
         sides={name: number[facets] for name, facets in sides.items()},
-        surfaces=surfaces or {},
-        cut=cut,
+        surfaces=read.surfaces,
+        cut=read.cut,
     )

@@ -236,8 +236,9 @@ def everywhere(holds: Callable[[Part], bool], sizes: Sequence[Fraction], *, shor
     or that lies far beyond all sizes.
     """
     parts = line(*sizes)
-    if not all(map(holds, _points(parts))):
-        return False
+    with suppress(ZeroDivisionError):
+        if not all(map(holds, _points(parts))):
+            return False
     for _ in range(MOST_PARTS):
         if not parts:
             return True

@@ -173,12 +173,8 @@ def contact_positions(discrete: Json) -> tuple[list[arb], list[arb]]:
     for other, own in zip(*both, strict=True):
         widths = [b - a for a, b in pairwise([own[0], *own, own[-1]])]
         halves = [(a + b) / 2 for a, b in pairwise(widths)]
-        increase = all(width > 0 for width in widths[1:-1])
-        if (
-            increase
-            and len(halves) == len(weights)
-            and all(close(w, h, h) for w, h in zip(weights, halves, strict=True))
-        ):
+        fits = len(halves) == len(weights) and all(width > 0 for width in widths[1:-1])
+        if fits and all(close(w, h, h) for w, h in zip(weights, halves, strict=True)):
             return own, (other if discrete["transfer"] else own)
     raise Refused("needed the trapezoid weights of the contact nodes")
 

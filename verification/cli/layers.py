@@ -52,18 +52,11 @@ def layers(
     from verification.document import Document
     from verification.free_norm.two_layers import two_layers
 
-    context = click.get_current_context()
-    for option, words in (("young", young), ("poisson", poisson), ("depth", depth)):
-        if words.count(",") != 1:
-            needed = "needed two numbers with a comma between, of the Neumann layer and of the contact layer"
-            raise click.UsageError(f"--{option} = {words}: {needed}", context)
     E, nu, d = (words.split(",") for words in (young, poisson, depth))
     try:
         found = two_layers(
             young=E, poisson=nu, depth=d, friction=friction, radius=radius, theta=theta, verified=verified
         )
     except HypothesisError as error:
-        names = {"E": "young", "nu": "poisson"}
-        known = HypothesisError(names.get(error.key, error.key), error.value, error.needed)
-        raise click.UsageError(f"--{known}", context) from None
+        raise click.UsageError(f"--{error}", click.get_current_context()) from None
     deliver(found, Document.sections, as_json, writing(target, as_figure), target)

@@ -344,7 +344,8 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Deci
         base = next((log for log in logs if log.readings), logs[0])
     if interval.contradiction is not None:
         if kind.linear and falling:
-            return base.readings, _falls_fastest(falling, "the logs contradict each other"), None
+            why = "it falls fastest; the logs contradict each other"
+            return base.readings, kept(_steepest(falling)[1], why), None
         why = "half of the smallest theta, in one time window, with ResAbs in the log: the logs contradict each other"
         return base.readings, NextRun(theta=_half(logs), why=why), None
     lo, hi, tied = interval.lo, interval.hi, kind.linear
@@ -408,7 +409,7 @@ def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, kind:
         why = "no linear coupling with real eigenvalues has all of these logs: a coupling with convection, one that is "
         why += "not linear, or leave out tied"
         if falling := [log for log in logs if log.converges]:
-            return base.readings, _falls_fastest(falling, why), None
+            return base.readings, kept(_steepest(falling)[1], f"it falls fastest; {why}"), None
         return base.readings, NextRun(theta=_half(logs), why=f"half of the smallest theta; {why}"), None
     if math.isinf(stiffest := max(box.b[1] for box in boxes)):
         return None
@@ -445,10 +446,9 @@ def cost_in_words(boxes: Sequence[Box], dear: float, kind: Kind) -> str:
     return f"{times} if {ends_in_words(boxes)}, {where}"
 
 
-def _falls_fastest(falling: Sequence[SeenLog], why: str) -> NextRun:
-    """Keep the theta of the log that falls fastest."""
-    _, theta = min((log.slowest.most, log.theta) for log in falling if log.slowest is not None)
-    return kept(theta, f"it falls fastest; {why}")
+def _steepest(falling: Sequence[SeenLog]) -> tuple[Fraction, Fraction]:
+    """The ratio and the theta of the log that falls fastest."""
+    return min((log.slowest.most, log.theta) for log in falling if log.slowest is not None)
 
 
 def _half(logs: Sequence[SeenLog]) -> float:
@@ -471,8 +471,7 @@ def fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:
 
     The prediction is for the slowest mode that there may be: a softest mode well above 0 leaves a smaller theta faster.
     """
-    found = [(log.slowest.most, log.theta) for log in falling if log.slowest is not None]
-    ratio, theta = min(found)
+    ratio, theta = _steepest(falling)
     if ratio >= predicted_rate(rho):
         return None
     predicted = f"{few(predicted_rate(rho))} is predicted of 2/(2 + rho) with rho = {few(rho)}"

@@ -135,12 +135,12 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
     growth = values[-2:] / values[-3:-1] if taken > 1 and not relative else np.zeros(1)
     explodes = growth.min() > EXPLODES and values[-1] == values.max()
     lost |= bool(explodes and growth.max() >= ABSURD)
+    growing = None
     if explodes and not lost:
         r = float(growth[-1])
         growing = Pace(kind="growth", value=r, least=r * (1 - 1e-9), most=r, steps=taken, **known)
     if taken < steps:
-        short = Pace(kind="short", steps=max(taken, int(arrived)), lost=lost, **known)
-        return growing if explodes and not lost else short
+        return growing or Pace(kind="short", steps=max(taken, int(arrived)), lost=lost, **known)
     known["steps"] = taken
     logs = np.log(values)
     limit = min(STEADY, float(theta) / 5)
@@ -197,7 +197,7 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
     small = int(np.argmax(values[::-1] > SMALL)) if relative and values.max() > SMALL else taken + 1
     if 0 < small <= steps:  # that a relative residual shows; windows of a few of them can be pooled
         return Pace(kind="short", **(known | {"steps": small - 1, "lost": lost}))
-    return growing if explodes and not lost else Pace(kind="unsteady", lost=lost, **known)
+    return growing or Pace(kind="unsteady", lost=lost, **known)
 
 
 def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> dict[str, Any] | None:

@@ -130,7 +130,10 @@ def two_layers(
     [5.1, 5.0]
     """
     E, nu, d = (_pair(name, pair) for name, pair in (("young", young), ("poisson", poisson), ("depth", depth)))
-    bodies = tuple(Moduli(young=e, poisson=n) for e, n in zip(E, nu, strict=True))
+    try:
+        bodies = tuple(Moduli(young=e, poisson=n) for e, n in zip(E, nu, strict=True))
+    except HypothesisError as error:
+        raise HypothesisError({"E": "young", "nu": "poisson"}[error.key], error.value, error.needed) from None
     if not all(body.kappa > 1 for body in bodies):
         raise HypothesisError("poisson", ", ".join(map(str, nu)), "compressible layers, nu < 1/2")
     depths = [take("depth", value, "a thickness > 0", lambda v: v > 0) for value in d]
@@ -147,7 +150,8 @@ def two_layers(
 
 def _pair(name: str, pair: Any) -> tuple[Any, Any]:
     if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
-        raise HypothesisError(name, pair, "two numbers, of the Neumann layer and of the contact layer")
+        given = ",".join(map(str, pair)) if isinstance(pair, (list, tuple)) else pair
+        raise HypothesisError(name, given, "two numbers, of the Neumann layer and of the contact layer")
     return pair[0], pair[1]
 
 

@@ -124,7 +124,9 @@ def test_units_of_length_and_stress_do_not_matter():
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"young": ("7e4",)}, "two numbers"),
+        ({"young": ("7e4",)}, "^young = 7e4: needed two numbers"),
+        ({"young": ("7e4", "2e4", "1")}, "^young = 7e4,2e4,1: needed two numbers"),
+        ({"young": ("a", "2e4")}, "^young = a: needed a number E > 0"),
         ({"poisson": ("0.3", "0.5")}, "nu < 1/2"),
         ({"depth": ("0.3", "0")}, "thickness > 0"),
         ({"friction": "0"}, "k > 0"),
