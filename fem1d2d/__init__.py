@@ -21,6 +21,7 @@ from fem1d2d.mesh import Mesh, MeshError, crossed, interval, rectangle, rectangl
 from fem1d2d.mesh_files import from_file
 from fem1d2d.outline import depths
 from fem1d2d.pencil import Eigenvalue, Extremes, extremes_by_solves, largest, largest_of, largest_sparse
+from fem1d2d.places import Place, means_at_nodes, node_at, place
 from fem1d2d.supports import Supports, pieces, rigid_motions, supports
 from fem1d2d.trace import facing, mortar, surface, trapezoid
 
@@ -34,6 +35,7 @@ __all__ = [
     "Material",
     "Mesh",
     "MeshError",
+    "Place",
     "Response",
     "Seen",
     "Supports",
@@ -53,8 +55,11 @@ __all__ = [
     "largest_of",
     "largest_sparse",
     "largest_strains",
+    "means_at_nodes",
     "mortar",
+    "node_at",
     "pieces",
+    "place",
     "plane_strain",
     "plane_stress",
     "rectangle",

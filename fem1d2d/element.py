@@ -31,7 +31,8 @@ class Element(ABC):
         What meshio calls its cells; empty where files for ParaView have none like them.
     supports : frozenset of str
         ``waves``: the layers of :mod:`fem1d2d.layers` are of its cells; ``proofs``: its matrices of rational meshes are
-        rational, and the checker of certificates knows them.
+        rational, and the checker of certificates knows them; ``values``: its shape functions are linear, with
+        :func:`gradients`, so that fields have values inside its cells.
     """
 
     words: str = "cells of another element"
@@ -61,7 +62,7 @@ class P1(Element):
 
     words: str
     vtk: str
-    supports = frozenset({"waves", "proofs"})
+    supports = frozenset({"waves", "proofs", "values"})
 
     def locks(self, mesh: Mesh) -> bool:
         return not crossed(mesh)
@@ -83,7 +84,12 @@ class P1(Element):
 ELEMENTS: dict[tuple[int, int], Element] = {(1, 2): P1("intervals", "line"), (2, 3): P1("triangles", "triangle")}
 
 #: What an element may lack, in words.
-ABILITIES = {"waves": "waves on layers", "proofs": "proofs", "vtk": "files for ParaView"}
+ABILITIES = {
+    "waves": "waves on layers",
+    "proofs": "proofs",
+    "values": "values inside the cells",
+    "vtk": "files for ParaView",
+}
 
 
 def element_of(mesh: Cells) -> Element:

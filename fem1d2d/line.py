@@ -245,16 +245,31 @@ def _onto(x: Floats, known: Floats, values: Floats) -> Floats:
 
 def _chained(mesh: Mesh, edges: Ints, side: str) -> Ints:
     """The nodes of edges that follow each other, from the first to the last."""
-    following = dict(edges.tolist())
-    first = set(following) - set(following.values())
-    if not first:
+    first, *others = chains(edges)
+    if first[0] == first[-1] and not others:
         raise MeshError(f"side {side!r} is closed: needed a line with two ends")
-    order = [min(first)]
-    while order[-1] in following and len(order) <= len(edges):
-        order.append(following[order[-1]])
-    if len(first) > 1 or len(order) != len(edges) + 1:
-        raise MeshError(f"side {side!r} has several pieces, one of which ends at {_at(mesh.points[order[-1]])}")
-    return np.array(order)
+    if others or len(first) != len(edges) + 1:
+        raise MeshError(f"side {side!r} has several pieces, one of which ends at {_at(mesh.points[first[-1]])}")
+    return first
+
+
+def chains(edges: Ints) -> list[Ints]:
+    """The nodes of edges that follow each other, piece by piece; a closed piece ends where it begins.
+
+    Examples
+    --------
+    >>> [nodes.tolist() for nodes in chains(np.array([[4, 5], [1, 2], [0, 1], [7, 8], [8, 7]]))]
+    [[0, 1, 2], [4, 5], [7, 8, 7]]
+    """
+    following = dict(edges.tolist())
+    open_ends = sorted(set(following) - set(following.values()))
+    found = []
+    while following:
+        piece = [open_ends.pop(0) if open_ends else min(following)]
+        while piece[-1] in following:
+            piece.append(following.pop(piece[-1]))
+        found.append(np.array(piece))
+    return found
 
 
 def _directions(vectors: Floats) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
@@ -60,6 +60,8 @@ class Mesh(Cells):
         Numbers of the cells of each named surface; those of two surfaces may be the same.
     cut : str
         Cells of a file that were cut into these, in words.
+    centres : int array, shape (q,)
+        Nodes in the middle of quadrilaterals that were split by both diagonals.
 
     Attributes
     ----------
@@ -76,6 +78,7 @@ class Mesh(Cells):
     sides: Mapping[str, Ints]
     surfaces: Mapping[str, Ints] = field(default_factory=dict)
     cut: str = ""
+    centres: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     boundary: Ints = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -130,9 +133,10 @@ class Mesh(Cells):
                 twice = _where(points, facets[first[np.argmax(count > 1)]])
                 raise MeshError(f"side {name!r} lists the facet {twice} {count.max()} times: once is needed")
         surfaces = {name: np.array(members, dtype=np.int64) for name, members in self.surfaces.items()}
-        for array in (points, cells, boundary, *sides.values(), *surfaces.values()):
+        centres = np.array(self.centres, dtype=np.int64)
+        for array in (points, cells, boundary, centres, *sides.values(), *surfaces.values()):
             array.setflags(write=False)
-        kept: dict[str, Any] = {"points": points, "cells": cells, "boundary": boundary}
+        kept: dict[str, Any] = {"points": points, "cells": cells, "boundary": boundary, "centres": centres}
         kept |= {"sides": MappingProxyType(sides), "surfaces": MappingProxyType(surfaces)}
         for name, value in kept.items():
             object.__setattr__(self, name, value)
@@ -141,8 +145,31 @@ class Mesh(Cells):
         return f"<Mesh: {len(self.points)} nodes, {len(self.cells)} cells, sides {', '.join(self.sides) or 'none'}>"
 
     def __reduce__(self) -> tuple[Any, ...]:  # a read-only mapping cannot be pickled, and numpy returns writable arrays
-        named = {"sides": dict(self.sides), "surfaces": dict(self.surfaces)}
-        return partial(Mesh, points=self.points, cells=self.cells, cut=self.cut, **named), ()
+        whole: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self) if field.init}
+        return partial(Mesh, **whole | {"sides": dict(self.sides), "surfaces": dict(self.surfaces)}), ()
+
+    @property
+    def quadrilaterals(self) -> tuple[Ints, Ints]:
+        """The four cells around each centre, and the corners of the quadrilateral that they are, each shape (q, 4).
+
+        Corners follow each other anticlockwise.
+
+        Examples
+        --------
+        >>> rectangle((0.0, 2.0), (0.0, 1.0), (2, 1), "both").quadrilaterals[1].tolist()
+        [[0, 2, 3, 1], [2, 4, 5, 3]]
+        """
+        if not len(self.centres):
+            return (np.empty((0, 4), dtype=np.int64),) * 2
+        place = np.full(len(self.points), -1)
+        place[self.centres] = np.arange(len(self.centres))
+        cell, corner = np.nonzero(place[self.cells] >= 0)
+        around = cell[np.argsort(place[self.cells[cell, corner]], kind="stable")].reshape(-1, 4)
+        apex = np.argmax(place[self.cells[around]] >= 0, axis=2)
+        starts = np.take_along_axis(self.cells[around], ((apex + 1) % 3)[..., None], axis=2)[..., 0]
+        spokes = (self.points[starts] - self.points[self.centres][:, None]).astype(float)
+        turn = np.argsort(np.arctan2(spokes[..., 1], spokes[..., 0]), axis=1, kind="stable")
+        return around, np.take_along_axis(starts, turn, axis=1)
 
     def split(self, names: Sequence[str]) -> Ints:
         """Return which of these surfaces each cell lies in, shape (c,).
@@ -360,6 +387,7 @@ def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int], split:
     return Mesh(
         points=points,
         cells=triangles,
+        centres=np.arange(node.size, len(points)),
         sides={"left": edge(node[0]), "right": edge(node[-1]), "bottom": edge(node[:, 0]), "top": edge(node[:, -1])},
     )
 

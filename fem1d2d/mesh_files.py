@@ -94,6 +94,7 @@ class Read(NamedTuple):
 
     points: Floats
     triangles: Ints
+    centres: Ints
     sides: Mapping[str, Ints]
     surfaces: Mapping[str, Ints]
     split: str
@@ -142,7 +143,7 @@ def read_in_process(path: Path) -> Read:
         lines, surfaces, *said = json.loads(found["names"].tobytes())
         sides = {name: found[f"lines{i}"] for i, name in enumerate(lines)}
         groups = {name: found[f"surfaces{i}"] for i, name in enumerate(surfaces)}
-        return Read(found["points"], found["triangles"], sides, groups, *said)
+        return Read(found["points"], found["triangles"], found["centres"], sides, groups, *said)
 
 
 def _of_group(read: Read, group: Sequence[str]) -> Read:
@@ -194,4 +195,5 @@ def _plane_mesh(read: Read) -> Mesh:
         sides={name: number[facets] for name, facets in sides.items()},
         surfaces=read.surfaces,
         cut=read.cut,
+        centres=number[read.centres][number[read.centres] >= 0],
     )

@@ -106,10 +106,10 @@ def contents(path: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``points`` of shape (n, 2) or (n, 3), ``triangles`` of shape (c, 3), ``lines`` of shape (l, 2) by their names,
-        ``surfaces``, the numbers of their triangles by their names, ``split``, why they are several materials, or "";
-        ``cut``, the cells that were no linear triangles, in words; ``plane``, elements of Abaqus that are of plane
-        strain or stress by these words.
+        ``points`` of shape (n, 2) or (n, 3), ``triangles`` of shape (c, 3), ``centres``, the points in the middle of
+        quadrilaterals, ``lines`` of shape (l, 2) by their names, ``surfaces``, the numbers of their triangles by their
+        names, ``split``, why they are several materials, or ""; ``cut``, the cells that were no linear triangles, in
+        words; ``plane``, elements of Abaqus that are of plane strain or stress by these words.
 
     Raises
     ------
@@ -144,7 +144,9 @@ def _contents(path: Path) -> dict[str, Any]:
     others = sorted(set(cells) - CUTS.keys() - PIECES.keys() - LEFT_OUT)
     if others:
         raise NotRead(f"needed only triangles and quadrilaterals, it has {', '.join(others)} too")
-    points, triangles, parts = _triangles(np.asarray(read.points, dtype=float), {name: cells[name] for name in plane})
+    points, triangles, parts, centres = _triangles(
+        np.asarray(read.points, dtype=float), {name: cells[name] for name in plane}
+    )
     groups = _surfaces(read, parts)
     split = sorted(materials) if materials else _split(read, groups, parts, len(triangles))
     why = ""
@@ -169,6 +171,7 @@ def _contents(path: Path) -> dict[str, Any]:
     return {
         "points": points,
         "triangles": triangles,
+        "centres": centres,
         "lines": lines,
         "surfaces": groups,
         "split": why,
@@ -206,9 +209,12 @@ def _by_meshio(path: Path, kind: str) -> tuple[Any, dict[str, Ints]]:
         raise NotRead(f"meshio cannot read it ({said[:SAID]})") from None
 
 
-def _triangles(points: Any, blocks: dict[str, Any]) -> tuple[Any, Ints, dict[str, Ints]]:
-    """Points, linear triangles of cells of several kinds, and the triangles of each cell by its kind, as rows."""
-    triangles, parts, count = [], {}, 0
+def _triangles(points: Any, blocks: dict[str, Any]) -> tuple[Any, Ints, dict[str, Ints], Ints]:
+    """Points, linear triangles of cells of several kinds, the triangles of each cell by its kind, as rows, and centres.
+
+    The last new points of a cell are the centres of the quadrilaterals that it is cut into before.
+    """
+    triangles, parts, count, centres = [], {}, 0, [np.empty(0, dtype=np.int64)]
     for name, cells in blocks.items():
         cut, new = CUTS[name]
         cells = np.asarray(cells, dtype=np.int64)
@@ -220,10 +226,11 @@ def _triangles(points: Any, blocks: dict[str, Any]) -> tuple[Any, Ints, dict[str
             number = len(points) + np.arange(made.shape[0] * made.shape[1]).reshape(made.shape[:2])
             points = np.concatenate([points, made.reshape(-1, points.shape[1])])
             cells = np.column_stack([cells, number])
+            centres.append(number[:, -len(cut) // len(_QUARTERS) :].ravel())
         triangles.append(cells[:, np.array(cut)].reshape(-1, 3))
         parts[name] = count + np.arange(len(triangles[-1])).reshape(len(cells), len(cut))
         count += len(triangles[-1])
-    return points, np.concatenate(triangles), parts
+    return points, np.concatenate(triangles), parts, np.concatenate(centres)
 
 
 def _surfaces(read: Any, parts: dict[str, Ints]) -> dict[str, Ints]:
@@ -379,7 +386,8 @@ def main(arguments: Sequence[str]) -> int:
         words = [*(list(found[kind]) for kind in kinds), *(found[word] for word in ("split", "cut", "plane"))]
         names = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
         named = {f"{kind}{i}": members for kind in kinds for i, members in enumerate(found[kind].values())}
-        np.savez(out, points=found["points"], triangles=found["triangles"], names=names, **named)
+        arrays = {name: found[name] for name in ("points", "triangles", "centres")}
+        np.savez(out, names=names, **arrays, **named)
         status, reason = 0, ""
     except NotRead as error:
         reason = str(error)

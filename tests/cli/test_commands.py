@@ -356,7 +356,7 @@ def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(
     assert written == "written: ndtheory-demo"
     assert {path.name for path in folder.iterdir()} == {
         *{"problem.toml", "report.html", "contact.csv", "history.csv", "interface.npz", "compare.json"},
-        *{"body1.vtu", "body2.vtu"},
+        *{"body1.vtu", "body2.vtu", "sides.csv"},
         *(f"{figure}.{ending}" for figure in ("bodies", "residuals", "waterfall") for ending in ("svg", "png")),
     }
     assert (folder / "problem.toml").read_text(encoding="utf-8") == examples()["section6"]

@@ -38,6 +38,7 @@ from verification.interface.assembly import TwoBodies, discretise
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair, pair_from
+from verification.interface.values import ASKED, PointValue, columns_of, values_on_sides
 from verification.problem import Problem, load
 from verification.problem.steps import Moment, at_rest, moments
 from verification.registry import BOUNDS
@@ -123,6 +124,12 @@ class Increment(Value, Part):
         name="contact.slip_increment",
         unit="length",
     )
+
+    @property
+    @says(**ASKED)
+    def points(self) -> tuple[PointValue, ...]:
+        """Values at the points that the problem names, at its end."""
+        return self.result.points
 
     @property
     @says()
@@ -237,6 +244,12 @@ class History(Document):
         return None if first is None else float(first.theta)
 
     @property
+    @says(**ASKED)
+    def points(self) -> tuple[PointValue, ...]:
+        """Values at the points that the problem names, at the end of the last increment."""
+        return self.increments[-1].points
+
+    @property
     @says(unit=WORK)
     def dissipated(self) -> float:
         """Work of friction in all increments, per unit thickness."""
@@ -303,12 +316,13 @@ class History(Document):
         """
         found, contact = [], self.increments[0].contact
         along = None if contact.normal is None else int(np.abs(contact.normal.mean(axis=0)).argmin())
-        for name in ("body1", "body2"):
-            bodies = [getattr(each.result.problem, name) for each in self.increments]
+        problems = [each.result.problem for each in self.increments if each.result.problem is not None]
+        for i in self.problem.bodies:
+            bodies = [problem.bodies[i] for problem in problems]
             for side, first in bodies[0].prescribed.items():
                 for axis in (axis for axis, value in enumerate(first) if value is not None):
-                    values = np.array([0.0, *(float(body.prescribed[side][axis]) for body in bodies)])
-                    label = f"displacement of {side} of {name} along {'xy'[axis]}"
+                    values = np.array([0.0, *(float(body.prescribed[side][axis] or 0) for body in bodies)])
+                    label = f"displacement of {side} of body{i} along {'xy'[axis]}"
                     found.append((axis == along, np.ptp(values), label, values, int(axis != along)))
         if moving := [each for each in found if each[1] > 0]:
             return max(moving, key=lambda each: each[:2])[2:]
@@ -330,17 +344,33 @@ class History(Document):
 
     def contact_table(self) -> dict[str, list[Any]]:
         """Return one row for each contact node of each increment, as columns."""
-        tables = [each.contact.table() for each in self.increments]
-        when = [(each.step, each.time) for each in self.increments for _ in each.contact.x]
-        columns = {name: [value for table in tables for value in table[name]] for name in tables[0]}
-        step, time = map(list, zip(*when, strict=True))
-        return {"step": step, "time": time, **columns, "slip_increment": self.fields["slip_increment"].ravel().tolist()}
+        found = self._over_time(lambda each: each.contact.table())
+        return {**found, "slip_increment": self.fields["slip_increment"].ravel().tolist()}
+
+    def point_table(self) -> dict[str, list[Any]]:
+        """Return one row for each point that the problem names and each increment, as columns."""
+        return self._over_time(lambda each: columns_of(each.points))
+
+    def side_table(self) -> dict[str, list[Any]]:
+        """Return one row for each node of the named sides and each increment, as columns."""
+        return self._over_time(lambda each: values_on_sides(each.result.bodies, each.result.displacements))
+
+    def _over_time(self, table: Callable[[Increment], Mapping[str, list[Any]]]) -> dict[str, list[Any]]:
+        found: dict[str, list[Any]] = {}
+        for each in self.increments:
+            columns = table(each)
+            rows = len(next(iter(columns.values()), ()))
+            when: dict[str, list[Any]] = {"step": [each.step] * rows, "time": [each.time] * rows}
+            for name, values in (when | dict(columns)).items():
+                found.setdefault(name, []).extend(values)
+        return found
 
     def plot(self, view: str = "loop", **options: Any) -> Figure:
         """Draw a view of the history; ValueError for another word, or where there is nothing to draw.
 
         Views: ``loop``, force against displacement; ``states``, a map over position and time of what sticks, slips and
-        is open; ``shear`` against the friction bound at a few increments (``times=[..]`` chooses them).
+        is open; ``shear`` against the friction bound at a few increments (``times=[..]`` chooses them); ``points``, the
+        displacement over time of the points that the problem names.
         """
         return self.drawn(view=view, **options)
 

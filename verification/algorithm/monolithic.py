@@ -34,6 +34,7 @@ from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Grids
 from verification.interface.pair import ContactPair
+from verification.interface.values import ASKED, PointValue, values_at_points
 from verification.machine.threads import one_thread
 from verification.problem import Problem, load
 
@@ -108,6 +109,12 @@ class Solution(Document):
     def checks(self) -> Checks:
         """Checks of the bodies outside Gamma_c, and of their strains."""
         return check_state(self.bodies, lambda: self.displacements, lambda: self.contact)
+
+    @cached_property
+    @says(**ASKED)
+    def points(self) -> tuple[PointValue, ...]:
+        """Values at the points that the problem names."""
+        return values_at_points(self.bodies, self.displacements) if self.bodies.places else ()
 
     @property
     @says()

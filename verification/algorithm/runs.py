@@ -36,6 +36,7 @@ from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Grids
 from verification.interface.pair import ContactPair
+from verification.interface.values import ASKED, PointValue, values_at_points
 from verification.machine.interrupts import INTERRUPTED
 from verification.machine.threads import one_thread
 from verification.problem import Problem
@@ -338,6 +339,14 @@ class Run(Document):
         """Checks of the bodies outside Gamma_c and of their strains, at the last iterate."""
         why = "the run diverged" if self.outcome == "diverged" else ""
         return check_state(self.pair, lambda: self.displacements, lambda: self.contact, why)
+
+    @cached_property
+    @says(**ASKED)
+    def points(self) -> tuple[PointValue, ...]:
+        """Values at the points that the problem names, at the last iterate."""
+        if self.problem is None or self.outcome == "diverged" or not self.bodies.places:
+            return ()
+        return values_at_points(self.bodies, self.displacements)
 
     @property
     @says(inside=dict.fromkeys(("cvxpy", "active_set"), SOLVED))

@@ -22,6 +22,7 @@ from verification.figures.style import (
     plain,
     styled,
 )
+from verification.interface.fields import ContactFields
 from verification.registry import draw as main_figure
 
 #: Colours of the states in a map; the orange of slip and the grey of open nodes look alike in grey print.
@@ -32,10 +33,15 @@ MOST_TIMES = 4
 
 
 def draw_history(history: History, view: str = "loop", **options: Any) -> Figure:
-    """One view of a history: ``loop``, ``states``, or ``shear`` (with ``times``); ValueError for another word."""
-    views: dict[str, Callable[..., Figure]] = {"loop": _loop, "states": _states, "shear": _shear}
+    """One view of a history: ``loop``, ``states``, ``points``, or ``shear`` (with ``times``).
+
+    ValueError for another word, and for the points of a problem that names none.
+    """
+    views: dict[str, Callable[..., Figure]] = {"loop": _loop, "states": _states, "shear": _shear, "points": _points}
     if view not in views:
         raise ValueError(f"{view!r}: needed one of {', '.join(views)}")
+    if view == "points" and not history.points:
+        raise ValueError("no points to draw: needed points = { tip = [x, y] } in the table of a body")
     with styled():
         figure = views[view](history, **options)
         if not history.converged and view != "shear":
@@ -76,9 +82,13 @@ def _loop(history: History) -> Figure:
 
 
 def _states(history: History) -> Figure:
-    x = history.increments[0].contact.x
-    order = list(MAP)
-    codes = np.array([[order.index(state) for state in each.contact.status] for each in history.increments])
+    lines = [_along(history, each.contact) for each in history.increments]
+    order, x = list(MAP), lines[0].x.copy()
+    codes = np.array([[order.index(state) for state in line.status] for line in lines], dtype=float)
+    between = np.flatnonzero(np.isnan(x))[:-1]  # lines of several bodies, one of which ends before the next begins
+    codes[:, between] = np.nan
+    x[between] = (x[between - 1] + x[between + 1]) / 2
+    codes, x = codes[:, ~np.isnan(x)], x[~np.isnan(x)]
     half = np.diff(x) / 2 if len(x) > 1 else np.array([0.5])
     edges = np.concatenate([[x[0] - half[0]], (x[:-1] + x[1:]) / 2, [x[-1] + half[-1]]])
     figure = new_figure(7.2, 4.2)
@@ -99,6 +109,11 @@ def _states(history: History) -> Figure:
     return figure
 
 
+def _along(history: History, contact: ContactFields) -> ContactFields:
+    """The fields over x, or over the distance s along named lines."""
+    return contact.unrolled() if history.problem.named else contact
+
+
 def _shear(history: History, times: Sequence[float] | None = None) -> Figure:
     every = np.array([each.time for each in history.increments])
     if times is None:
@@ -108,7 +123,7 @@ def _shear(history: History, times: Sequence[float] | None = None) -> Figure:
     figure = new_figure(7.2, 1.2 + 1.6 * len(chosen))
     axes = np.atleast_1d(figure.subplots(len(chosen), sharex=True, sharey=True))
     for ax, i in zip(axes, chosen, strict=True):
-        contact = history.increments[i].contact
+        contact = _along(history, history.increments[i].contact)
         look: Any = {"facecolor": "0.9", "edgecolor": "0.4", "linestyle": ":"}
         ax.fill_between(contact.x, -contact.bound, contact.bound, label="friction bound", **look)
         ax.plot(contact.x, contact.shear, "--", color=SHEAR, label="shear on body 2")
@@ -117,6 +132,25 @@ def _shear(history: History, times: Sequence[float] | None = None) -> Figure:
         ax.set_ylabel(f"stress [{plain(history.problem.units['stress'])}]")
         legend_beside(ax)
     axes[-1].set_xlabel(f"position along $\\Gamma_c$ [{plain(history.problem.units['length'])}]")
+    return figure
+
+
+def _points(history: History) -> Figure:
+    time = [0.0, *(each.time for each in history.increments)]
+    table, count = history.point_table(), len(history.points)
+    length = plain(history.problem.units["length"])
+    axes = [name for name in ("ux", "uy") if name in table]
+    figure = new_figure(7.2, 1.2 + 2.0 * len(axes))
+    for i, (ax, name) in enumerate(zip(np.atleast_1d(figure.subplots(len(axes), sharex=True)), axes, strict=True)):
+        for k, point in enumerate(history.points):
+            look: Any = {"color": f"{0.65 * k / max(count - 1, 1):.3f}", "markersize": 3}
+            label = f"{plain(point.name)} (body {point.body})"
+            ax.plot(time, [0.0, *table[name][k::count]], f"{'os^Dvx*'[k % 7]}-", label=label, **look)
+        ax.set_ylabel(f"{name[0]}$_{name[1]}$ [{length}]")
+        if i == 0:
+            ax.set_title(f"{plain(history.problem.title)}: displacement of the points")
+            legend_beside(ax)
+    ax.set_xlabel("time, in steps")
     return figure
 
 

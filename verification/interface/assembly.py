@@ -5,18 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from fem1d2d import (
     Mesh,
     MeshError,
+    Place,
     Supports,
     body_load,
     facet_weights,
     from_file,
     interval,
+    node_at,
     pieces,
+    place,
     rectangle,
     rigid_motions,
     stiffness,
@@ -136,6 +141,16 @@ def _check_pieces(problem: Problem, body: Body, *, hinged: bool) -> None:
     raise problem.refuse(next(owners), None, f"{needed}, or leave it out")
 
 
+class NamedPlace(NamedTuple):
+    """A point that the problem names: the number of its body in the file, and its place on the mesh of `body`."""
+
+    body: Body
+    number: int
+    name: str
+    point: Floats
+    place: Place
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TwoBodies(Value):
     """Two bodies on their meshes along Gamma_c; one of them may be rigid.
@@ -190,8 +205,8 @@ class TwoBodies(Value):
         def loaded(body: Body | None) -> Body | None:
             if body is None:
                 return None
-            load = _load(problem, body.name, body.mesh, body.nodes, self.interface)
             known = _supports(problem, body.name, body.mesh)
+            load = _load(problem, body.name, body.mesh, known, body.nodes, self.interface)
             if known.values[body.nodes[self.interface.planes[body is self.neumann]]].any():
                 needed = "needed 0 along Gamma_c at its ends that both bodies hold: they are planes of symmetry"
                 raise problem.refuse(f"{body.name}.prescribed", None, needed)
@@ -201,6 +216,11 @@ class TwoBodies(Value):
         interface = copied(self.interface, slipped=still if slipped is None else slipped)
         body1, body2 = loaded(self.body1), loaded(self.body2)
         return replace(self, body1=body1, body2=body2, interface=interface, problem=problem)
+
+    @cached_property
+    def places(self) -> tuple[NamedPlace, ...]:
+        """The points that the problem names, body by body; ProblemError for one that lies in no cell."""
+        return tuple(named for body in self.elastic for named in _places(self.problem, body))
 
     @property
     def outside(self) -> list[str]:
@@ -346,7 +366,20 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         which = "bodies that touch" if problem.several else "body1 and body2"
         needed = f"{which} can move rigidly together, each held only by the other: fix or prescribe some sides"
         raise problem.refuse("contact" if problem.several else "body2", None, needed)
+    assert bodies.places is not None  # refuses points outside the bodies
     return bodies
+
+
+def _places(problem: Problem, body: Body) -> Iterator[NamedPlace]:
+    """Yield the points that a body names, or the bodies of a union."""
+    for own, spec, prefix in _owners(getattr(problem, body.name), body.name):
+        for name, point in spec.points.items():
+            at = np.array(point, dtype=float)
+            try:
+                found = place(body.mesh, at, body.mesh.surfaces[own] if prefix else None)
+            except MeshError as error:
+                raise problem.refuse(f"{own}.points.{name}", list(point), f"needed a point of it: {error}") from None
+            yield NamedPlace(body, int(own.removeprefix("body")), name, at, found)
 
 
 def _check_extents(problem: Problem, name: str, mesh: Mesh | None) -> None:
@@ -484,8 +517,10 @@ def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes
     raise problem.refuse(f"{own}.{key}", value, needed)
 
 
-def _load(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, interface: Interface) -> Floats:
-    """Return the nodal forces of the body force and of tractions, shape (n, d); ProblemError for a force that is lost.
+def _load(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, interface: Interface) -> Floats:
+    """Return the nodal forces of body force, tractions and point loads, shape (n, d).
+
+    ProblemError for a force that is lost, and for a point load away from every node.
 
     ``nodes`` are those of Gamma_c: no traction acts between the ends of its lines.
     """
@@ -501,6 +536,15 @@ def _load(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, interface: Inte
                 needed = "Gamma_c covers this side: a force there is lost"
                 raise problem.refuse(f"{own}.traction.{side}", list(force), needed)
             load += loaded[:, None] * plain(force)
+        for point, force in spec.point_load.items():
+            try:
+                node = node_at(mesh, np.array(point, dtype=float), mesh.surfaces[own] if prefix else None)
+            except MeshError as error:
+                raise problem.refuse(f"{own}.point_load", list(point), str(error)) from None
+            if (known.held[node] & (np.array(force, dtype=float) != 0)).any():
+                needed = "the node there is held along the force, which is lost"
+                raise problem.refuse(f"{own}.point_load", list(point), needed)
+            load[node] += plain(force)
     return load
 
 
@@ -533,7 +577,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
     motions = rigid_motions(mesh, known.held)
     material = material_of(spec, mesh=mesh)
     matrix = stiffness(mesh, material)
-    load = _load(problem, name, mesh, nodes, interface)
+    load = _load(problem, name, mesh, known, nodes, interface)
     free = np.flatnonzero(~known.held.ravel())
     rigid = motions.reshape(known.held.size, motions.shape[2])[free]
     right = load.ravel()[free] - (matrix @ known.values.ravel())[free]

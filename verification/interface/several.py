@@ -84,15 +84,19 @@ def together(problem: Problem, meshes: Mapping[int, Mesh]) -> Mesh:
     sides: dict[str, Ints] = {}
     surfaces: dict[str, Ints] = {}
     corners: list[Ints] = []
+    centres: list[Ints] = []
     for i, mesh in meshes.items():
         sides |= {f"body{i}.{side}": facets + points for side, facets in mesh.sides.items()}
         surfaces |= {f"body{i}.{surface}": members + cells for surface, members in mesh.surfaces.items()}
         surfaces[f"body{i}"] = cells + np.arange(len(mesh.cells))
         corners.append(mesh.cells + points)
+        centres.append(mesh.centres + points)
         points, cells = points + len(mesh.points), cells + len(mesh.cells)
     drawn = np.concatenate([mesh.points.astype(float) for mesh in meshes.values()])
     try:
-        return Mesh(points=drawn, cells=np.concatenate(corners), sides=sides, surfaces=surfaces)
+        return Mesh(
+            points=drawn, cells=np.concatenate(corners), sides=sides, surfaces=surfaces, centres=np.concatenate(centres)
+        )
     except MeshError as error:
         numbers = ", ".join(map(str, meshes))
         needed = f"bodies {numbers} have one role in the iteration, and must not touch each other: {error}"

@@ -9,7 +9,7 @@ import numpy as np
 
 from fem1d2d import MeshError, stresses, von_mises
 from fem1d2d.element import element_of, lacks
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Floats, measures
 from ndtheory import __version__
 from ndtheory.texts import printable
 from verification.algorithm.history import History
@@ -41,7 +41,8 @@ def write_series(history: History, room: Path) -> None:
 def write_fields(result: Run | Solution, room: Path, place: str = "") -> None:
     """Write ``body1.vtu`` and ``body2.vtu``: displacement at the nodes, stresses on the cells; none where rigid.
 
-    A run is written at its last iterate; ``place`` follows the name of the body.
+    Quadrilaterals that were cut into triangles are written as they were, without their centres.  A run is written at
+    its last iterate; ``place`` follows the name of the body.
     """
     bodies, units = result.bodies, result.units
     says = f"lengths in {units['length']}, stresses in {units['stress']}"
@@ -57,12 +58,25 @@ def _write(path: Path, body: Body, u: Floats, says: str) -> None:
     if why := lacks(mesh, "vtk"):
         raise MeshError(f"{body.name}: {why}")
     spatial = lambda vectors: np.pad(vectors, ((0, 0), (0, 3 - mesh.dimension)))
-    tensor = stresses(mesh, body.material, u)
+    tensor, (around, corners) = stresses(mesh, body.material, u), mesh.quadrilaterals
+    kept = np.delete(np.arange(len(mesh.points)), mesh.centres)
+    number = np.full(len(mesh.points), -1)
+    number[kept] = np.arange(len(kept))
+    sizes = measures(mesh.points, mesh.cells)[around][..., None, None]
+    whole = np.delete(np.arange(len(mesh.cells)), around)
+    blocks = [
+        (element_of(mesh).vtk, mesh.cells[whole], tensor[whole]),
+        ("quad", corners, (sizes * tensor[around]).sum(axis=1) / sizes.sum(axis=1)),
+    ]
+    blocks = [block for block in blocks if len(block[1])]
     written = meshio.Mesh(
-        spatial(mesh.points),
-        [(element_of(mesh).vtk, mesh.cells)],
-        point_data={"displacement": spatial(u)},
-        cell_data={"stress": [tensor[:, *SIX]], "von_mises": [von_mises(tensor)]},
+        spatial(mesh.points[kept]),
+        [(kind, number[cells]) for kind, cells, _ in blocks],
+        point_data={"displacement": spatial(u[kept])},
+        cell_data={
+            "stress": [stress[:, *SIX] for *_, stress in blocks],
+            "von_mises": [von_mises(stress) for *_, stress in blocks],
+        },
     )
     meshio.write(path, written, file_format="vtu")
     first, _, rest = path.read_text("utf-8").partition("\n")

@@ -26,8 +26,11 @@ def _drawn(*names: str) -> tuple[str, ...]:
     return tuple(f"{name}.{ending}" for name in names for ending in ("svg", "png"))
 
 
+#: Values at the points that a problem names, and along the named sides.
+_VALUES = ("points.csv", "sides.csv")
+
 #: Gamma_c, matrices and fields of a result; the fields of an increment are ``body1-0001.vtu``, .. in ``body1.pvd``.
-_RESULT = ("contact.csv", "P.npz", "body1.vtu", "body2.vtu", *_drawn("bodies"))
+_RESULT = ("contact.csv", *_VALUES, "P.npz", "body1.vtu", "body2.vtu", *_drawn("bodies"))
 _SERIES = ("body1.pvd", "body2.pvd")
 _IN_SERIES = "body[12]-[0-9][0-9][0-9][0-9].vtu"
 
@@ -38,7 +41,10 @@ _RUN = (*_RESULT, "history.csv", "interface.npz", *_drawn("residuals"))
 FILES: dict[Kind, tuple[str, ...]] = {
     "run": ("run.json", *_RUN),
     "solve": ("solve.json", *_RESULT),
-    "march": ("history.json", "contact.csv", "history.csv", *_SERIES, *_drawn("loop", "states", "shear")),
+    "march": (
+        *("history.json", "contact.csv", "history.csv", *_VALUES, *_SERIES),
+        *_drawn("loop", "states", "shear", "points"),
+    ),
     "compare": ("compare.json", *_RUN, *_drawn("waterfall"), "report.html"),
     "reproduce": ("reproduce.json", *_drawn("reproduce"), *(f"fig{number}.csv" for number in (5, 10, 11, 12))),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),

@@ -10,6 +10,7 @@ from ndtheory import __version__
 from verification.algorithm.runs import Run
 from verification.document import Document
 from verification.interface.files import write_interface, write_transfer
+from verification.interface.values import columns_of, values_on_sides
 from verification.ledger import sheets
 from verification.machine.interrupts import undisturbed
 from verification.output.fields import write_fields, write_series
@@ -95,6 +96,8 @@ class Folder:
         length, stress = result.units["length"], result.units["stress"]
         units = f"x, y, s, gap, slip in {length}; pressure, shear, bound in {stress}"
         _csv(room / "contact.csv", units, result.contact.table())
+        sides = values_on_sides(result.bodies, result.displacements)
+        _values(room, result.units, columns_of(result.points), sides)
         if isinstance(result, Run):
             _csv(room / "history.csv", "residuals in the norm (5.21), relative ones without unit", result.table())
             write_interface(result.pair, room / "interface.npz")
@@ -112,9 +115,11 @@ class Folder:
         units = f"x, gap, slip in {length}; stresses in {stress}; forces in {stress} {length}"
         _csv(room / "contact.csv", units, history.contact_table())
         _csv(room / "history.csv", f"one row an increment; {units}", history.table())
+        _values(room, history.units, history.point_table(), history.side_table())
         write_series(history, room)
         self._problem(room, history)
-        _save(room, {view: draw_history(history, view) for view in ("loop", "states", "shear")})
+        views = ("loop", "states", "shear", *(["points"] if history.points else []))
+        _save(room, {view: draw_history(history, view) for view in views})
 
     def _problem(self, room: Path, result: Document) -> None:
         if result.problem is not None and ours(self.path / "problem.toml"):
@@ -142,6 +147,16 @@ def _pages(room: Path, ledger: Ledger) -> None:
     if ledger.whole:
         _text(room / "errata.md", sheets.errata(ledger))
         _text(room / "verdicts.json", sheets.verdicts(ledger))
+
+
+def _values(
+    room: Path, units: Mapping[str, str], points: Mapping[str, Sequence[Any]], sides: Mapping[str, Sequence[Any]]
+) -> None:
+    """Displacements and stresses at the points that the problem names, if any, and along the named sides."""
+    says = f"x, y, ux, uy in {units['length']}; sxx, syy, sxy, mises in {units['stress']}, means of cells"
+    for name, columns in (("points", points), ("sides", sides)):
+        if columns:
+            _csv(room / f"{name}.csv", says, columns)
 
 
 def _text(path: Path, text: str) -> None:

@@ -25,6 +25,7 @@ from verification.problem.tables import TomlTable
 from verification.problem.writing import plain
 
 T = TypeVar("T")
+K = TypeVar("K")
 V = TypeVar("V")
 
 #: The default of a key that the file must have; the default of a table that may be missing and is then read as empty.
@@ -32,7 +33,7 @@ REQUIRED: Any = object()
 EMPTY: Any = object()
 
 
-class ReadOnly(Mapping[str, V]):
+class ReadOnly(Mapping[K, V]):
     """An immutable mapping that a frozen dataclass can hold; equal ones iterate alike, in the order of the keys.
 
     >>> ReadOnly({"top": 1, "left": 2})
@@ -41,13 +42,13 @@ class ReadOnly(Mapping[str, V]):
 
     __slots__ = ("_values",)
 
-    def __init__(self, values: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
-        self._values = dict(sorted(dict(values).items()))
+    def __init__(self, values: Mapping[K, V] | Iterable[tuple[K, V]] = ()) -> None:
+        self._values: dict[K, V] = dict(sorted(dict(values).items()))
 
-    def __getitem__(self, key: str) -> V:
+    def __getitem__(self, key: K) -> V:
         return self._values[key]
 
-    def __iter__(self) -> Iterator[str]:
+    def __iter__(self) -> Iterator[K]:
         return iter(self._values)
 
     def __len__(self) -> int:
@@ -149,7 +150,7 @@ class Entries(keys.Part):
                 value = None if one.later and value == one.default else one.counts(value)
             value = _inside(value, counting)
             if isinstance(value, Spread):
-                found |= value
+                found |= {name: each for name, each in value.items() if each != {}}
             elif value not in (None, (), {}):
                 found[one.name or name] = value
         return found

@@ -150,6 +150,33 @@ def by_side(value: Any, at: At, *, free: bool = False) -> dict[str, Components]:
     return result
 
 
+def place(value: Any, at: At) -> tuple[Fraction, ...]:
+    """Read a point, as it is drawn."""
+    found: tuple[Any, ...] = vector(value, at)
+    return found
+
+
+def by_name(value: Any, at: At) -> dict[str, tuple[Fraction, ...]]:
+    """Read points by their names."""
+    table = at.inside(value)
+    return {name: table.take(name, lambda given: place(given, at)) for name in names(table)}
+
+
+def forces_at(value: Any, at: At) -> dict[tuple[Fraction, ...], Components]:
+    """Read forces by the points at which they act, in tables of both."""
+    if not isinstance(value, (list, tuple)) or not all(isinstance(each, Mapping) for each in value):
+        raise Unfit("needed a list of tables, as [{ at = [1.0, 0.3], force = [0.0, -60.0] }]")
+    found: dict[tuple[Fraction, ...], Components] = {}
+    for i, each in enumerate(value, 1):
+        table = at.table.within(f"{at.name}[{i}]", each)
+        point = table.take("at", lambda given: place(given, at))
+        if point in found:
+            raise table.refuse("at", list(point), "needed one force for each point")
+        found[point] = table.take("force", lambda given: vector(given, at))
+        table.close()
+    return found
+
+
 def by_surface(value: Any, at: At, read: Callable[[Any], Fraction]) -> Any:
     """Read a number, or a table of them by the named surfaces of a mesh file."""
     if not isinstance(value, Mapping) or not value:

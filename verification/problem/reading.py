@@ -52,8 +52,6 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
     iteration = read_entries(IterationSpec, table, **around)
     table.close()
     if several:
-        if "step" in top:
-            raise top.refuse("step", None, "needed two bodies: histories of more bodies are not supported yet")
         chosen = iteration["neumann_bodies"]
         iteration["neumann_body"] = 1 if 1 in chosen else 2
         one, other = (
@@ -63,7 +61,7 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
     else:
         one, other = bodies[1], bodies[2]
     found |= {"body1": one, "body2": other, "contacts": tuple(contacts), "iteration": IterationSpec(**iteration)}
-    found |= {"steps": () if several else _read_steps(top, bodies, around)}
+    found |= {"steps": _read_steps(top, bodies, around)}
     top.close()
     return ProblemSpec(**found, source=source)
 
@@ -216,11 +214,12 @@ def _read_steps(top: TomlTable, bodies: Mapping[int, BodySpec], around: Mapping[
     steps: list[StepSpec] = []
     for number, table in enumerate(top.take("step", tables_of(top, "step"), []), 1):
         found = read_entries(StepSpec, table, number=number, before=sum(step.increments for step in steps))
+        loads = {}
         for i, body in bodies.items():
             within = dict(around, shape=body.shape, parts=body.parts, kept=())
-            found[f"body{i}"] = _read_loads(table.table(f"body{i}"), body, held[i], within, first=number == 1)
+            loads[i] = _read_loads(table.table(f"body{i}"), body, held[i], within, first=number == 1)
         table.close()
-        steps.append(StepSpec(**found))
+        steps.append(StepSpec(**found, body1=loads.pop(1), body2=loads.pop(2), others=loads))
     return tuple(steps)
 
 

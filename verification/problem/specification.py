@@ -208,9 +208,9 @@ class Problem(ProblemSpec):
         return replace(self, iteration=replace(self.iteration, theta=read_theta(theta)))
 
     @property
-    def prescribes(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """The sides of body 1 and of body 2 with prescribed displacements."""
-        return tuple(self.body1.prescribed), tuple(self.body2.prescribed)
+    def prescribes(self) -> tuple[tuple[str, ...], ...]:
+        """The sides with prescribed displacements, body by body."""
+        return tuple(tuple(body.prescribed) for body in self.bodies.values())
 
     @property
     def contact_body(self) -> Literal[1, 2]:
@@ -237,8 +237,6 @@ class Problem(ProblemSpec):
         def halved(name: str, body: BodySpec) -> BodySpec:
             if not halvings or body.rigid:
                 return body
-            if body.members:
-                return BodySpec.union((i, halved(f"body{i}", member)) for i, member in body.members)
             if body.cells is None:
                 named = body.mesh.path.name if body.mesh else None
                 raise self.refuse(f"{name}.mesh", named, "a mesh file cannot be halved")
@@ -250,7 +248,7 @@ class Problem(ProblemSpec):
 
         if not isinstance(halvings, int) or halvings < 0:  # type: ignore[redundant-expr]  # a caller need not be typed
             raise ValueError(f"{halvings} halvings: a whole number >= 0 is needed")
-        return replace(self, body1=halved("body1", self.body1), body2=halved("body2", self.body2))
+        return self.holding({i: halved(f"body{i}", body) for i, body in self.bodies.items()})
 
 
 def _key(name: str, source: str) -> Key:

@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from ndtheory.keys import Part, key, says
+from ndtheory.keys import Key, Part, key, says
 from ndtheory.moduli import Moduli
 from verification.problem import readers
 from verification.problem.entries import EMPTY, REQUIRED, At, Entries, ReadOnly, Spread, entry, read_table
@@ -177,8 +177,23 @@ class Loads(Entries):
         type="vector",
         **_LOAD,
     )
+    point_load: Mapping[tuple[Fraction, ...], tuple[Fraction, ...]] = entry(
+        "forces at points, as `[{ at = [1.0, 0.3], force = [0.0, -60.0] }]`: each acts on the nearest node of the body,"
+        " at most half an edge away",
+        unit="stress · length",
+        reader=readers.forces_at,
+        default=ReadOnly(),
+        write=lambda loads: tuple({"at": point, "force": force} for point, force in loads.point_load.items()),
+        type="list of object",
+        inside={
+            "at": Key(says="the point, before deformation", unit="length", type="vector"),
+            "force": Key(says="its force per unit thickness", unit="stress · length", type="vector"),
+        },
+        **_LOAD,
+    )
 
 
+_nothing = lambda value: None
 _drawn = lambda at: "mesh" not in at.table
 _needed = lambda at: REQUIRED if _elastic(at) else None
 _of_surfaces = lambda body, i: {name: moduli[i] for name, moduli in body.materials.items()}
@@ -301,6 +316,16 @@ class BodySpec(Loads):
         default=(),
         only=_elastic,
         counts=lambda sides: tuple(sorted(sides)),
+    )
+    points: Mapping[str, tuple[Fraction, ...]] = entry(
+        "points of the body, as `{ tip = [0.0, 1.0] }`: `run`, `solve` and `march` give displacement and stress there",
+        unit="length",
+        reader=readers.by_name,
+        default=EMPTY,
+        initial=ReadOnly(),
+        only=_elastic,
+        counts=_nothing,
+        type="map of vector",
     )
     plane: Literal["strain", "stress"] = "strain"
     materials: Mapping[str, tuple[Fraction, Fraction]] = ReadOnly()
@@ -551,7 +576,18 @@ class StepSpec(Entries):
         f"number of equal increments, at most {MOST_INCREMENTS} in all steps", None, 1, "1", reader=_increments
     )
     body1: Loads = entry("loads at the end of the step", shown="as before", absent="where there is none")
-    body2: Loads = entry("loads at the end of the step", shown="as before", absent="where there is none")
+    body2: Loads = entry(
+        "loads at the end of the step, and so on for further bodies",
+        shown="as before",
+        absent="where there is none",
+        write=lambda step: Spread((f"body{i}", loads) for i, loads in step.loads.items() if i > 1),
+    )
+    others: Mapping[int, Loads] = ReadOnly()
+
+    @property
+    def loads(self) -> dict[int, Loads]:
+        """The loads that it names, by the numbers of the bodies."""
+        return {1: self.body1, 2: self.body2, **self.others}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -569,9 +605,6 @@ class Norm(Entries):
     length: Fraction = entry(
         r"$L$ in the norm $\lvert v\rvert^2/L^2 + \lvert\nabla v\rvert^2$", positive, Fraction(1), "length"
     )
-
-
-_nothing = lambda value: None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -641,6 +674,13 @@ class ProblemSpec(Entries):
         """The bodies of the file by their numbers."""
         members = dict(self.body1.members + self.body2.members)
         return dict(sorted(members.items())) or {1: self.body1, 2: self.body2}
+
+    def holding(self, bodies: Mapping[int, BodySpec]) -> Self:
+        """Return the same problem with other bodies of the same numbers, which keep their roles."""
+        if not self.several:
+            return replace(self, body1=bodies[1], body2=bodies[2])
+        one, other = (BodySpec.union((i, bodies[i]) for i in self.numbers(body)) for body in (1, 2))
+        return replace(self, body1=one, body2=other)
 
     def numbers(self, body: int) -> tuple[int, ...]:
         """Return the numbers in the file of the bodies that body 1 or body 2 stands for."""

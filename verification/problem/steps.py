@@ -12,8 +12,8 @@ from typing import Any
 from verification.problem.specification import Problem
 from verification.problem.specs import Loads
 
-#: The loads of both bodies.
-Both = tuple[Loads, Loads]
+#: The loads of all bodies, by their numbers.
+All = dict[int, Loads]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,18 +49,18 @@ def moments(problem: Problem) -> Iterator[Moment]:
         for i in range(1, step.increments + 1):
             share = Fraction(i, step.increments)
             mix = lambda a, b, share=share: a + share * (b - a)
-            first, second = (_of_each(mix, *ends) for ends in zip(before, after, strict=True))
-            yield Moment(step=number, name=step.name, time=number - 1 + share, problem=_under(problem, (first, second)))
+            loads = {i: _of_each(mix, before[i], after[i]) for i in before}
+            yield Moment(step=number, name=step.name, time=number - 1 + share, problem=_under(problem, loads))
 
 
-def _path(problem: Problem) -> list[Both]:
+def _path(problem: Problem) -> list[All]:
     """Return the loads where the history begins, 0 on every side that the bodies or the steps name, and at each end."""
-    rest = []
-    for name in ("body1", "body2"):
-        named: list[Loads] = [getattr(each, name) for each in (problem, *problem.steps)]
-        rest.append(_of_each(lambda _: Fraction(0), reduce(_after, named)))
-    later = lambda loads, step: (_after(loads[0], step.body1), _after(loads[1], step.body2))
-    return list(accumulate(problem.steps, later, initial=(rest[0], rest[1])))
+    rest = {}
+    for i, body in problem.bodies.items():
+        named: list[Loads] = [body, *(step.loads[i] for step in problem.steps)]
+        rest[i] = _of_each(lambda _: Fraction(0), reduce(_after, named))
+    later = lambda loads, step: {i: _after(before, step.loads[i]) for i, before in loads.items()}
+    return list(accumulate(problem.steps, later, initial=rest))
 
 
 def path_warnings(problem: Problem) -> list[str]:
@@ -69,7 +69,7 @@ def path_warnings(problem: Problem) -> list[str]:
         return []
     return [
         "the loads of the [[step]] tables are not proportional to one parameter, so that friction depends on the path:"
-        " this takes the loads of [body1] and [body2], applied at once; `ndtheory march` follows the steps"
+        " this takes the loads of the bodies' own tables, applied at once; `ndtheory march` follows the steps"
     ]
 
 
@@ -87,10 +87,15 @@ def proportional(problem: Problem) -> bool:
     return multiples == path and factors == sorted(factors) and factors[0] >= 0
 
 
-def _numbers(loads: Both) -> list[Fraction]:
+def _numbers(loads: All) -> list[Fraction]:
     """Return all components of the loads in one list."""
     vectors = [
-        vector for each in loads for vector in (*each.prescribed.values(), *each.traction.values(), each.body_force)
+        vector
+        for each in loads.values()
+        for vector in (
+            *(*each.prescribed.values(), *each.traction.values(), *each.point_load.values()),
+            each.body_force,
+        )
     ]
     return [v for vector in vectors for v in vector if v is not None]
 
@@ -100,6 +105,7 @@ def _after(before: Loads, step: Loads) -> Loads:
         prescribed={**before.prescribed, **step.prescribed},
         traction={**before.traction, **step.traction},
         body_force=step.body_force or before.body_force,
+        point_load={**before.point_load, **step.point_load},
     )
 
 
@@ -113,11 +119,11 @@ def _of_each(of: Callable[..., Fraction], *loads: Loads) -> Loads:
         prescribed={side: mixed(each.prescribed[side] for each in loads) for side in loads[0].prescribed},
         traction={side: mixed(each.traction[side] for each in loads) for side in loads[0].traction},
         body_force=mixed(each.body_force for each in loads),
+        point_load={at: mixed(each.point_load[at] for each in loads) for at in loads[0].point_load},
     )
 
 
-def _under(problem: Problem, loads: Both) -> Problem:
+def _under(problem: Problem, loads: All) -> Problem:
     """Return the problem under given loads, without steps."""
-    bodies = zip((problem.body1, problem.body2), loads, strict=True)
-    body1, body2 = (replace(body, **vars(under)) for body, under in bodies)
-    return replace(problem, body1=body1, body2=body2, steps=())
+    bodies = {i: replace(body, **vars(loads[i])) for i, body in problem.bodies.items()}
+    return replace(problem.holding(bodies), steps=())

@@ -7,7 +7,7 @@ from itertools import groupby
 
 from verification import registry
 from verification.algorithm.history import History
-from verification.sections.run import then, unfinished
+from verification.sections.run import AT_POINTS, point_rows, then, unfinished
 from verification.sections.setting import limits, setting
 from verification.show.numbers import NONE, count, figures, near_one
 from verification.show.parts import Cell, Note, Quantity, Sections, Shown, following, section, table
@@ -30,10 +30,12 @@ def sections(found: History) -> Sections:
     """The sections."""
     first = found.increments[0].result
     nodes = sum(len(body.mesh.points) for body in first.bodies.elastic)
-    after = following("march", "-o", "results", written=("explore", "-o", "page.html"))
+    page = () if found.problem.several else ("explore", "-o", "page.html")
+    after = following("march", "-o", "results", written=page)
     return (
         setting(found.problem, nodes, len(found.increments[0].contact.x)),
         section("history", "WHAT HAPPENED", *_happened(found), caption=STEPS, pictures=PICTURES),
+        *_at_points(found),
         *([section("promise", PROMISE, *_promised(found))] if found.method == "iteration" else []),
         limits(found.outside, then(found.increments[-1].result, "march", after)),
     )
@@ -64,13 +66,22 @@ def _happened(found: History) -> Iterable[Shown | str]:
     yield table(head, rows, right=(1,))
     unit = f"{units['stress']} {units['length']}"
     if found.problem.dimension == 2:
-        yield f"normal and tangential force in {unit}, work of friction in {unit}^2 (per unit thickness)"
+        sums = ", sums over all contacts" if found.problem.several else ""
+        yield f"normal and tangential force in {unit}{sums}, work of friction in {unit}^2 (per unit thickness)"
     else:
         yield f"normal force in {units['stress']} (per unit area)"
     if found.ended:
         yield Note(f"{found.ended}.", lead="Not whole:")
         if (last := found.increments[-1].run) is not None and last.unfinished:
             yield from unfinished(last, f"the end of increment {len(found.increments)}")
+
+
+def _at_points(found: History) -> Sections:
+    """The values at the points that a problem names, at the end of each step."""
+    ends = [[*group][-1] for _, group in groupby(found.increments, key=lambda each: each.step)]
+    rows = [(each.name, one) for each in ends for one in each.points]
+    pictures = (("points", "The displacement of the named points over time."),)
+    return (section("points", AT_POINTS, *point_rows(rows, found.units), pictures=pictures),) if rows else ()
 
 
 def _range(numbers: Sequence[int | None]) -> Cell:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+
 from verification import registry
 from verification.algorithm.monolithic import Solution
 from verification.algorithm.rates import steps
 from verification.algorithm.runs import Run
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Interface
+from verification.interface.values import PointValue, columns_of
 from verification.problem.specification import Problem
 from verification.problem.specs import PLACES
 from verification.sections.setting import limits, setting
@@ -25,6 +28,8 @@ from verification.show.parts import (
     section,
     table,
 )
+
+AT_POINTS = "WHAT HAPPENS AT THE POINTS?"
 
 #: What the table of a run shows, and its figures.
 RATES = (
@@ -51,6 +56,7 @@ def sections(finished: Run) -> Sections:
     return (
         setting(finished.problem.with_theta(finished.theta), nodes, finished.pair.contact.grid.n, meshes),
         happened(finished, alone=True),
+        *at_points(finished.points, finished.units, finished.unfinished),
         limits(finished.outside, then(finished, "run", following("compare", iteration=True))),
     )
 
@@ -141,8 +147,34 @@ def solution(found: Solution) -> Sections:
     return (
         setting(problem, sum(len(mesh.points) for mesh in meshes), bodies.interface.contact.n, meshes),
         section("solution", "WHAT IS THE SOLUTION?", *parts, certified),
+        *at_points(found.points, found.units),
         limits(bodies.outside, then),
     )
+
+
+def at_points(points: Sequence[PointValue], units: Mapping[str, str], unfinished: str = "") -> Sections:
+    """The values at the points that a problem names; no section where it names none."""
+    if not points:
+        return ()
+    lead = [Note("", lead=f"{unfinished.capitalize()}:")] if unfinished else []
+    return (section("points", AT_POINTS, *lead, *point_rows([("", one) for one in points], units)),)
+
+
+def point_rows(points: Sequence[tuple[str, PointValue]], units: Mapping[str, str]) -> Iterator[Shown | str]:
+    """A table of values at points, each with words for when, and their units."""
+    values = columns_of([one for _, one in points])
+    shown = [name for name in values if name not in ("body", "name", "x", "y")]
+    when, rounding = any(moment for moment, _ in points), 1e-12
+    numbers = [
+        [figures(value if abs(value) > rounding * max(map(abs, values[name])) else 0.0, 4) for value in values[name]]
+        for name in shown
+    ]
+    rows = [
+        (*([moment] if when else []), f"{one.name} (body {one.body})", *cells)
+        for (moment, one), *cells in zip(points, *numbers, strict=True)
+    ]
+    yield table((*(["end of"] if when else []), "point", *shown), rows)
+    yield f"u in {units['length']}, stresses in {units['stress']}: means over the cells that hold the point"
 
 
 def _grids(problem: Problem, contact_body: int, interface: Interface) -> list[Shown]:

@@ -305,7 +305,7 @@ def test_bodies_that_move_together_are_refused():
         ({"body3": {"shape": "rigid"}}, "body3.shape", "an obstacle has no named sides"),
         ({"body3": plate((2, 3), "1e-28")}, "body3.young", "within 1e+08"),
         ({"body4": plate((3, 4))}, "body4", "needed a table [[contact]]"),
-        ({"step": [{}]}, "step", "histories of more bodies"),
+        ({"step": [{"body4": {}}]}, "step[1].body4", "known here: name, increments, body1, body2, body3"),
         ({"iteration": {"neumann_body": 2}}, "iteration.neumann_body", "needed neumann_bodies, a list"),
         ({"iteration": {"neumann_bodies": [1, 2]}}, "iteration.neumann_bodies", "not both of 1 and 2"),
         ({"iteration": {"neumann_bodies": [1]}}, "iteration.neumann_bodies", "not none of 2 and 3"),

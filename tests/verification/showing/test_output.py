@@ -18,7 +18,7 @@ from verification.output.folder import Folder
 
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
 DRAWN = {"compare.json", "report.html", "waterfall.svg", "waterfall.png"}
-TABLES = {"problem.toml", "contact.csv", "history.csv", "interface.npz", "body1.vtu", "body2.vtu"}
+TABLES = {"problem.toml", "contact.csv", "history.csv", "sides.csv", "interface.npz"} | {"body1.vtu", "body2.vtu"}
 WRITTEN = {"run": FIGURES | TABLES | {"run.json"}, "comparison": FIGURES | TABLES | DRAWN}
 OURS = WRITTEN["comparison"] - {"problem.toml"}  # that of a user stays as it is
 

@@ -8,6 +8,7 @@ import pytest
 from problem_list import bars, changed
 
 import verification as vf
+from fem1d2d import stresses
 from verification.output.fields import write_fields
 
 #: A column on rollers, free on its right, whose top is pressed down by DOWN; the state in it is uniform.
@@ -81,3 +82,38 @@ def test_a_file_names_its_units_and_is_the_same_every_time(tmp_path):
     assert (first / "body1.vtu").read_bytes() == (second / "body1.vtu").read_bytes()
     assert (first / "body1.vtu").read_text("utf-8").splitlines()[1].endswith("lengths in -> mm, stresses in MPa -->")
     assert len(meshio.read(first / "body1.vtu").points) == 20
+
+
+def test_quadrilaterals_are_written_without_the_nodes_that_split_them(tmp_path):
+    """The stress of each is the mean of its four triangles, equal in size; its corners run anticlockwise."""
+    data = changed(body1={"split": "both"}, body2={"split": "both"})
+    result = vf.solve(vf.Problem.from_dict(data))
+    for body, u, found in zip(result.bodies.elastic, result.displacements, read(result, tmp_path), strict=True):
+        quads = found.cells_dict["quad"]
+        assert set(found.cells_dict) == {"quad"}
+        assert len(found.points) == len(body.mesh.points) - len(quads)
+        corners = found.points[quads][..., :2]
+        turned = np.roll(corners, -1, axis=1)
+        areas = (corners[..., 0] * turned[..., 1] - corners[..., 1] * turned[..., 0]).sum(axis=1) / 2
+        assert areas == pytest.approx(np.full(len(quads), areas[0]))
+        assert areas.sum() == pytest.approx(np.prod(np.ptp(found.points[:, :2], axis=0)))
+        mean = stresses(body.mesh, body.material, u).reshape(-1, 4, 3, 3).mean(axis=1)
+        assert found.cell_data["stress"][0][:, [0, 1, 3]] == pytest.approx(mean[:, [0, 1, 0], [0, 1, 1]], rel=1e-12)
+        assert np.array_equal(found.point_data["displacement"][:, :2], u[: len(found.points)])
+
+
+def test_a_mesh_of_triangles_and_quadrilaterals_keeps_both(tmp_path):
+    points = np.array([[0, -1], [1, -1], [2, -1], [0, 0], [1, 0], [2, 0]], dtype=float)
+    cells = [("line", [[0, 1], [1, 2]]), ("triangle", [[0, 1, 4], [0, 4, 3]]), ("quad", [[1, 2, 5, 4]])]
+    tags = [np.array([1, 1]), np.array([9, 9]), np.array([9])]
+    names = {"bottom": np.array([1, 1]), "all": np.array([9, 2])}
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    flat = np.column_stack([points, np.zeros(6)])
+    mesh = meshio.Mesh(flat, cells, cell_data=data, field_data=names)
+    meshio.write(tmp_path / "mixed.msh", mesh, file_format="gmsh22", binary=False)
+    body = {"mesh": str(tmp_path / "mixed.msh"), "young": 2, "poisson": 0, "fixed": ["bottom"]}
+    found = vf.solve(vf.Problem.from_dict({**changed(), "body1": body}))
+    lower = read(found, tmp_path)[0]
+    assert {kind: len(cells) for kind, cells in lower.cells_dict.items()} == {"triangle": 2, "quad": 1}
+    assert lower.points[:, :2] == pytest.approx(points)
+    assert lower.cells_dict["quad"].tolist() == [[1, 2, 5, 4]]
