@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
 from itertools import pairwise
@@ -60,6 +60,8 @@ class Mesh(Cells):
         Numbers of the cells of each named surface; those of two surfaces may be the same.
     cut : str
         Cells of a file that were cut into these, in words.
+    shares : mapping from text to bool
+        The named surfaces of a file of which it takes a group, as ``wing of both.msh``: True if it has cells of them.
     centres : int array, shape (q,)
         Nodes in the middle of quadrilaterals that were split by both diagonals.
 
@@ -78,6 +80,7 @@ class Mesh(Cells):
     sides: Mapping[str, Ints]
     surfaces: Mapping[str, Ints] = field(default_factory=dict)
     cut: str = ""
+    shares: Mapping[str, bool] = field(default_factory=dict)
     centres: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     boundary: Ints = field(init=False, repr=False)
 
@@ -146,7 +149,7 @@ class Mesh(Cells):
 
     def __reduce__(self) -> tuple[Any, ...]:  # a read-only mapping cannot be pickled, and numpy returns writable arrays
         whole: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self) if field.init}
-        return partial(Mesh, **whole | {"sides": dict(self.sides), "surfaces": dict(self.surfaces)}), ()
+        return partial(Mesh, **whole | {name: dict(whole[name]) for name in ("sides", "surfaces", "shares")}), ()
 
     @property
     def quadrilaterals(self) -> tuple[Ints, Ints]:
@@ -196,6 +199,14 @@ class Mesh(Cells):
             left = int((which < 0).sum())
             raise MeshError(f"{left} of {len(which)} cells lie in none of the surfaces {', '.join(names)}")
         return which
+
+
+def shared(meshes: Iterable[Mesh]) -> dict[str, bool]:
+    """The named surfaces of the files from which meshes take groups: True where one of them has cells of it."""
+    found: dict[str, bool] = {}
+    for mesh in meshes:
+        found |= {name: has or found.get(name, False) for name, has in mesh.shares.items()}
+    return found
 
 
 def _whole(what: str, values: Any, columns: int) -> Ints:

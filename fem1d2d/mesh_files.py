@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +61,7 @@ def from_file(
     path = Path(path)
     try:
         _check_kind(path)
-        read = _of_group(read_in_process(path), group)
+        read = _of_group(read_in_process(path), group, path.name)
         if read.split and one_material:
             raise MeshError(read.split)
         other = {"strain": "stress", "stress": "strain"}.get(plane or "", "")
@@ -100,6 +101,7 @@ class Read(NamedTuple):
     split: str
     cut: str
     plane: Mapping[str, str]
+    shares: Mapping[str, bool] = MappingProxyType({})
 
 
 def read_in_process(path: Path) -> Read:
@@ -146,7 +148,7 @@ def read_in_process(path: Path) -> Read:
         return Read(found["points"], found["triangles"], found["centres"], sides, groups, *said)
 
 
-def _of_group(read: Read, group: Sequence[str]) -> Read:
+def _of_group(read: Read, group: Sequence[str], file: str) -> Read:
     """The part of a file that some of its named surfaces make; all of it where none are named."""
     if not group:
         return read
@@ -159,12 +161,16 @@ def _of_group(read: Read, group: Sequence[str]) -> Read:
     outline = codes[times == 1]
     sides = {name: facets[np.isin(undirected(facets, count), outline)] for name, facets in read.sides.items()}
     own = {name: np.flatnonzero(np.isin(chosen, members)) for name, members in read.surfaces.items()}
+    bare = np.setdiff1d(np.arange(len(read.triangles)), np.concatenate([*read.surfaces.values()]))
+    shares = {f"{name} of {file}": len(members) > 0 for name, members in own.items()}
+    shares |= {f"{len(bare)} triangles without a name of {file}": False} if len(bare) else {}
     return read._replace(
         triangles=triangles,
         sides={name: facets for name, facets in sides.items() if len(facets)},
         surfaces={name: members for name, members in own.items() if len(members)},
         split="",
         cut=f"the file's {read.cut}" if read.cut else "",
+        shares=shares,
     )
 
 
@@ -195,5 +201,6 @@ def _plane_mesh(read: Read) -> Mesh:
         sides={name: number[facets] for name, facets in sides.items()},
         surfaces=read.surfaces,
         cut=read.cut,
+        shares=read.shares,
         centres=number[read.centres][number[read.centres] >= 0],
     )

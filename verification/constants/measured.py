@@ -38,7 +38,7 @@ FROM_MATRICES = "the pair is made from matrices: needed the meshes of both bodie
 
 @dataclass(frozen=True, kw_only=True)
 class BodyConstants(Part):
-    """Coercivity m^a and continuity M^a of one body (4.1).
+    """Coercivity m^a and continuity M^a of one body (4.1); ``cut`` as of its mesh.
 
     ``residual_m``, ``residual_M`` are relative residuals of the eigenvalues, whose errors are of the order of their
     squares.
@@ -51,6 +51,7 @@ class BodyConstants(Part):
     nodes: int = key("of its mesh")
     residual_m: float
     residual_M: float
+    cut: str = ""
 
 
 _RHO_CELLS = says(
@@ -138,6 +139,11 @@ class Measured(Document):
     def nodes(self) -> int | None:
         """Nodes of both bodies; None where only matrices are known."""
         return None if self.body1 is None or self.body2 is None else self.body1.nodes + self.body2.nodes
+
+    @property
+    def cuts(self) -> tuple[str, ...]:
+        """The cells of mesh files that were cut into triangles, in words."""
+        return tuple(body.cut for body in (self.body1, self.body2) if body is not None)
 
     @cached_property
     def _of_cells(self) -> cells.OfCells:

@@ -186,6 +186,7 @@ def _of(body: Body, smallest: Eigenvalue | None, biggest: Eigenvalue) -> BodyCon
         m=Number(value=0.0, lo=0.0, hi=0.0, level="exact") if smallest is None else Number.of_float(1 / smallest.value),
         M=Number.of_float(biggest.value),
         nodes=len(body.mesh.points),
+        cut=body.mesh.cut,
         residual_m=0.0 if smallest is None else smallest.residual / smallest.value,
         residual_M=biggest.residual / biggest.value,
     )

@@ -28,7 +28,7 @@ from fem1d2d import (
     supports,
 )
 from fem1d2d.element import element_of
-from fem1d2d.mesh import Floats, Ints, Split
+from fem1d2d.mesh import Floats, Ints, Split, shared
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
 from verification.interface.body import Body, Name, in_frames, material_of, turning
@@ -266,6 +266,8 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
             ' quadrilaterals that are split by both diagonals (0.3 %): split = "both" of a rectangle, or a mesh file'
             " with quadrilaterals"
         )
+    if unowned := [name for name, has in shared(body.mesh for body in bodies).items() if not has]:
+        found.append(f"no body takes {short(', '.join(unowned), 300)}: these cells are left out")
     if interface.gap.min() < -READING * float(np.ptp(interface.contact.x)):
         j = int(np.argmin(interface.gap))
         found.append(

@@ -10,12 +10,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from fem1d2d import Mesh, MeshError, Supports
-from fem1d2d.mesh import Floats, Ints
+from fem1d2d.mesh import Floats, Ints, shared
 from verification.interface.friction import OF_TWO
 from verification.interface.interface import Grid, Interface, Law, Stretch
 from verification.interface.joining import check_profile, join
@@ -93,10 +94,10 @@ def together(problem: Problem, meshes: Mapping[int, Mesh]) -> Mesh:
         centres.append(mesh.centres + points)
         points, cells = points + len(mesh.points), cells + len(mesh.cells)
     drawn = np.concatenate([mesh.points.astype(float) for mesh in meshes.values()])
+    cut = " and ".join(dict.fromkeys(mesh.cut for mesh in meshes.values() if mesh.cut))
+    rest: dict[str, Any] = {"cut": cut, "shares": shared(meshes.values()), "centres": np.concatenate(centres)}
     try:
-        return Mesh(
-            points=drawn, cells=np.concatenate(corners), sides=sides, surfaces=surfaces, centres=np.concatenate(centres)
-        )
+        return Mesh(points=drawn, cells=np.concatenate(corners), sides=sides, surfaces=surfaces, **rest)
     except MeshError as error:
         numbers = ", ".join(map(str, meshes))
         needed = f"bodies {numbers} have one role in the iteration, and must not touch each other: {error}"
@@ -133,11 +134,18 @@ def join_lines(
         except ProblemError as error:
             raise _renamed(error, order, number) from None
         joined.append(interface)
-        for of_body, before, start, i in zip(nodes, found, first, order, strict=True):
-            if any(np.isin(before + start, earlier).any() for earlier in of_body):
-                needed = f"two contacts share a node of body {i}: needed a side or a part of one for each"
+        for of_body, mesh, before, start, i in zip(nodes, meshes, found, first, order, strict=True):
+            own = before + start
+            shared_with = [own[np.isin(own, earlier)] for earlier in of_body]
+            if common := [node for some in shared_with for node in some]:
+                assert mesh is not None
+                x, y = map(float, mesh.points[common[0]])
+                needed = (
+                    f"two contacts share the node of body {i} at ({x:g}, {y:g}): needed sides, or parts of sides, that"
+                    " have no node in common along their lines of contact"
+                )
                 raise problem.refuse(f"contact[{number}].surface", list(line.surface or ()), needed)
-            of_body.append(before + start)
+            of_body.append(own)
     law = Blocks(parts=tuple(joined), scales=tuple(map(float, problem.shares)))
     return [np.concatenate(each) for each in nodes], _one_after_another(problem, joined, flipped, law)
 

@@ -77,7 +77,7 @@ class Parts(Listener):
     def constants(self, measured: Measured, choice: Choice) -> None:
         problem = self.pair.problem
         assert problem is not None  # see `sections`
-        first = setting(problem.with_theta(choice.theta), measured.nodes, measured.interface_nodes)
+        first = setting(problem.with_theta(choice.theta), measured.nodes, measured.interface_nodes, measured.cuts)
         self.show((first,))
         if measured.unverified is not None:
             self.waiting.append(compared(measured))

@@ -74,7 +74,7 @@ def sections(measured: Measured) -> Sections:
     title = "WHICH CONSTANTS DOES THE THEOREM USE?"
     caption = "The constants on this mesh: those of Section 5, then rho and those of the theorem in energy norms."
     return (
-        setting(problem, measured.nodes, measured.interface_nodes),
+        setting(problem, measured.nodes, measured.interface_nodes, measured.cuts),
         section("all constants", title, *parts, caption=caption),
         closing("", Note(ends, 0), Note(f"{mesh}: {unsafe}.", 0), then=then),
     )

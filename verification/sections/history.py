@@ -7,7 +7,7 @@ from itertools import groupby
 
 from verification import registry
 from verification.algorithm.history import History
-from verification.sections.run import AT_POINTS, point_rows, then, unfinished
+from verification.sections.run import AT_POINTS, counted, point_rows, then, unfinished
 from verification.sections.setting import limits, setting
 from verification.show.numbers import NONE, count, figures, near_one
 from verification.show.parts import Cell, Note, Quantity, Sections, Shown, following, section, table
@@ -29,11 +29,11 @@ PICTURES = (
 def sections(found: History) -> Sections:
     """The sections."""
     first = found.increments[0].result
-    nodes = sum(len(body.mesh.points) for body in first.bodies.elastic)
+    nodes, cuts = counted(first.bodies)
     page = () if found.problem.several else ("explore", "-o", "page.html")
     after = following("march", "-o", "results", written=page)
     return (
-        setting(found.problem, nodes, len(found.increments[0].contact.x)),
+        setting(found.problem, nodes, len(found.increments[0].contact.x), cuts),
         section("history", "WHAT HAPPENED", *_happened(found), caption=STEPS, pictures=PICTURES),
         *_at_points(found),
         *([section("promise", PROMISE, *_promised(found))] if found.method == "iteration" else []),

@@ -8,6 +8,7 @@ from verification import registry
 from verification.algorithm.monolithic import Solution
 from verification.algorithm.rates import steps
 from verification.algorithm.runs import Run
+from verification.interface.assembly import TwoBodies
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Interface
 from verification.interface.values import PointValue, columns_of
@@ -51,14 +52,19 @@ def sections(finished: Run) -> Sections:
     """The sections; none of a run on matrices without a problem."""
     if finished.problem is None:
         return ()
-    meshes = [body.mesh for body in finished.bodies.elastic]
-    nodes = sum(len(mesh.points) for mesh in meshes)
+    nodes, cuts = counted(finished.bodies)
     return (
-        setting(finished.problem.with_theta(finished.theta), nodes, finished.pair.contact.grid.n, meshes),
+        setting(finished.problem.with_theta(finished.theta), nodes, finished.pair.contact.grid.n, cuts),
         happened(finished, alone=True),
         *at_points(finished.points, finished.units, finished.unfinished),
         limits(finished.outside, then(finished, "run", following("compare", iteration=True))),
     )
+
+
+def counted(bodies: TwoBodies) -> tuple[int, list[str]]:
+    """The number of nodes of all bodies, and the cells of their files that were cut into triangles."""
+    meshes = [body.mesh for body in bodies.elastic]
+    return sum(len(mesh.points) for mesh in meshes), [mesh.cut for mesh in meshes]
 
 
 def then(finished: Run | Solution, command: str, otherwise: Next) -> Next:
@@ -137,15 +143,15 @@ def _at_the_end(finished: Run) -> str:
 @registry.sections.register
 def solution(found: Solution) -> Sections:
     """The sections of the global method."""
-    bodies, meshes = found.bodies, [body.mesh for body in found.bodies.elastic]
-    problem = bodies.problem
+    bodies, problem = found.bodies, found.bodies.problem
+    nodes, cuts = counted(bodies)
     runs = len(bodies.elastic) == 2 and not bodies.interface.only_solved
     then = following("run") if runs else following("solve", "-o", "results")
-    nodes = Labelled("nodes", _nodes(problem, found.contact))
-    parts = (*_grids(problem, problem.contact_body, bodies.interface), nodes, *_contact(problem, found.contact))
+    states = Labelled("nodes", _nodes(problem, found.contact))
+    parts = (*_grids(problem, problem.contact_body, bodies.interface), states, *_contact(problem, found.contact))
     certified = f"KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c"
     return (
-        setting(problem, sum(len(mesh.points) for mesh in meshes), bodies.interface.contact.n, meshes),
+        setting(problem, nodes, bodies.interface.contact.n, cuts),
         section("solution", "WHAT IS THE SOLUTION?", *parts, certified),
         *at_points(found.points, found.units),
         limits(bodies.outside, then),

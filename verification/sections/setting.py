@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fem1d2d import Mesh
 from verification.problem.specification import Problem
 from verification.problem.specs import PLACES
 from verification.registry import LAWS
@@ -12,11 +11,11 @@ from verification.show.numbers import figures
 from verification.show.parts import Facts, Next, Section, closing, outside_the_theorem, section
 
 
-def setting(problem: Problem, nodes: int | None, interface: int, meshes: Iterable[Mesh] = ()) -> Section:
+def setting(problem: Problem, nodes: int | None, interface: int, cuts: Iterable[str] = ()) -> Section:
     """A problem, on so many nodes of both bodies and of Gamma_c, and what cells of their files were cut."""
     units, contact = problem.units, problem.contact
     counts = [] if nodes is None else [f"{nodes} nodes, {interface} on Gamma_c"]
-    counts += [f"triangles cut from {mesh.cut}" for mesh in meshes if mesh.cut]
+    counts += [f"triangles cut from {cut}" for cut in cuts if cut]
     bodies = problem.bodies.values()
     moduli = " / ".join("rigid" if one.rigid else " to ".join(f"{float(E):g}" for E in one.youngs) for one in bodies)
     body = problem.iteration.neumann_body

@@ -7,6 +7,7 @@ from problem_list import blocks
 
 import verification as vf
 from fem1d2d import MeshError, from_file
+from verification.cli import main
 
 
 def one_file(path, *, merged):
@@ -75,3 +76,31 @@ def test_a_group_that_is_none_is_refused(group, needed, tmp_path):
     body = {"mesh": one_file(tmp_path / "both.msh", merged=False), "young": 1, "poisson": 0, "group": group}
     with pytest.raises(vf.ProblemError, match=rf"body1.group = .*: needed {needed}"):
         vf.Problem.from_dict({**data, "body1": body | {"fixed": ["lower bottom"]}})
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_surfaces_that_no_body_takes_are_named_in_a_warning(several, tmp_path):
+    mesh = one_file(tmp_path / "both.msh", merged=False)
+    data = blocks()
+    lower = {"mesh": mesh, "young": 3, "poisson": "0.3", "fixed": ["lower bottom"]}
+    two = {"mesh": mesh, "group": "upper", "young": 2, "poisson": "0.3", "prescribed": {"upper top": [0, "-1/50"]}}
+    above = {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [4, 2], "young": 2, "poisson": "0.3"}
+    above |= {"prescribed": {"top": [0, "-1/50"]}}
+    touch = {"bodies": [1, 2], "surface": ["lower top", "bottom"]}
+    contact = {"contact": [touch]} if several else {}
+    alone = vf.solve(vf.Problem.from_dict({**data, **contact, "body1": lower | {"group": "lower"}, "body2": above}))
+    assert "no body takes upper of both.msh: these cells are left out" in alone.warnings
+    assert "triangles cut from the file's 16 quadrilaterals" in str(alone.sections())
+    both = vf.solve(vf.Problem.from_dict({**data, "body1": lower | {"group": "lower"}, "body2": two}))
+    assert not [line for line in both.warnings if "left out" in line]
+
+
+def test_commands_say_what_was_cut(tmp_path, capsys):
+    mesh = one_file(tmp_path / "both.msh", merged=False)
+    lower = {"mesh": mesh, "young": 3, "poisson": "0.3", "group": "lower", "fixed": ["lower bottom"]}
+    data = blocks(body2={"prescribed": {"top": [0, "-1/50"]}}) | {"body1": lower}
+    data |= {"step": [{"body2": {"prescribed": {"top": [0, "-1/50"]}}}]}
+    (tmp_path / "my.toml").write_text(vf.Problem.from_dict(data).to_toml(), "utf-8")
+    for command in ("constants", "march", "compare"):
+        main([command, str(tmp_path / "my.toml"), "--set", "iteration.neumann_body=1", "--set", "iteration.theta=auto"])
+        assert "triangles cut from the file's 16 quadrilaterals" in " ".join(capsys.readouterr().out.split())
