@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,30 @@ class Line:
 
     @classmethod
     def along(cls, mesh: Mesh, side: str, *, left: bool, mirrored: NDArray[np.bool_] | None = None) -> Line:
-        """Order the nodes of a named side.
+        """Order the nodes of a named side, which is one line with two ends and without a sharp corner.
+
+        Parameters as of :meth:`parts`.
+
+        Raises
+        ------
+        MeshError
+            A side in several pieces, without ends, or with a corner of more than SHARPEST degrees.
+        """
+        line, *others = cls.parts(mesh, side, left=left, mirrored=mirrored)
+        for other in others:
+            if line.nodes[-1] == other.nodes[0]:
+                raise MeshError(line.corner(other, side))
+        if others:
+            raise MeshError(f"side {side!r} has several pieces, one of which ends at {_at(line.points[-1])}")
+        if line.nodes[0] == line.nodes[-1]:
+            raise MeshError(f"side {side!r} is closed: needed a line with two ends")
+        return line
+
+    @classmethod
+    def parts(
+        cls, mesh: Mesh, side: str, *, left: bool, mirrored: NDArray[np.bool_] | None = None, away: Floats | None = None
+    ) -> list[Line]:
+        """Order the nodes of a named side, which is cut at corners of more than SHARPEST degrees.
 
         Parameters
         ----------
@@ -57,15 +81,29 @@ class Line:
         mirrored : bool array, shape (nodes, 2), optional
             Components that a support holds: where it holds one of an end node, the line goes on as its mirror image, as
             in one half of a symmetric body, and that end's normal lies along the axis; not beyond a corner.
-
-        Raises
-        ------
-        MeshError
-            A side in several pieces, without ends, or with a corner of more than SHARPEST degrees.
+        away : array, shape (m, 2), optional
+            Points far from which a closed line without a corner begins and ends.
         """
         on_boundary, on_side = (undirected(edges, len(mesh.points)) for edges in (mesh.boundary, mesh.sides[side]))
         edges = mesh.boundary[np.isin(on_boundary, on_side)]
-        nodes = _chained(mesh, edges if left else edges[:, ::-1], side)
+        found = []
+        for nodes in chains(edges if left else edges[:, ::-1]):
+            points = mesh.points[nodes].astype(float)
+            turns = _turns(points)
+            if nodes[0] == nodes[-1]:
+                sharpest = int(np.argmax(turns[:-1]))
+                if turns[sharpest] <= SHARPEST and away is not None:
+                    sharpest = _farthest(points[:-1], away)
+                nodes = np.append(np.roll(nodes[:-1], -sharpest), nodes[sharpest])
+                turns = np.append(np.roll(turns[:-1], -sharpest), turns[sharpest])
+            cuts = np.flatnonzero(turns[1:-1] > SHARPEST) + 1
+            for begin, end in pairwise([0, *cuts.tolist(), len(nodes) - 1]):
+                found.append(cls._through(mesh, nodes[begin : end + 1], mirrored))
+        return found
+
+    @classmethod
+    def _through(cls, mesh: Mesh, nodes: Ints, mirrored: NDArray[np.bool_] | None) -> Line:
+        """The line through nodes that follow each other."""
         points = mesh.points[nodes].astype(float)
         steps = np.diff(points, axis=0)
         lengths = np.linalg.norm(steps, axis=1)
@@ -79,16 +117,17 @@ class Line:
                 if held.sum() == 1 and image @ steps[end] > np.cos(np.radians(SHARPEST)):
                     edge[end] = image
                     images[end] = points[end] + (image if end else -image) * lengths[end]
-        turn = np.degrees(np.arctan2(_cross(before, after), (before * after).sum(axis=1)))
-        sharp = int(np.argmax(np.abs(turn)))
-        if abs(turn[sharp]) > SHARPEST:
-            raise MeshError(
-                f"the corner of side {side!r} at ({points[sharp, 0]:g}, {points[sharp, 1]:g}) has"
-                f" {abs(turn[sharp]):.3g} degrees: needed at most {SHARPEST:g}; cut it there, or mesh a curve finer"
-            )
         tangents = before + after
         normals = _directions(np.stack([-tangents[:, 1], tangents[:, 0]], axis=1))
         return cls(nodes=nodes, points=points, normals=normals, images=(images[0], images[1]))
+
+    def corner(self, following: Line, side: str) -> str:
+        """Why the corner at which this line ends and another one begins lies on no line of contact."""
+        turn = _turns(np.vstack([self.points[-2:], following.points[1:2]]))[1]
+        return (
+            f"the corner of side {side!r} at {_at(self.points[-1])} has {turn:.3g} degrees: needed at most"
+            f" {SHARPEST:g}; cut it there, or mesh a curve finer"
+        )
 
     @cached_property
     def s(self) -> Floats:
@@ -243,14 +282,18 @@ def _onto(x: Floats, known: Floats, values: Floats) -> Floats:
     return found
 
 
-def _chained(mesh: Mesh, edges: Ints, side: str) -> Ints:
-    """The nodes of edges that follow each other, from the first to the last."""
-    first, *others = chains(edges)
-    if first[0] == first[-1] and not others:
-        raise MeshError(f"side {side!r} is closed: needed a line with two ends")
-    if others or len(first) != len(edges) + 1:
-        raise MeshError(f"side {side!r} has several pieces, one of which ends at {_at(mesh.points[first[-1]])}")
-    return first
+def _turns(points: Floats) -> Floats:
+    """Angles between the edges that meet at each point of a line, in degrees; 0 at an end that is not the other end."""
+    steps = np.diff(points, axis=0)
+    closed = bool((points[0] == points[-1]).all())
+    before, after = np.vstack([steps[[-1 if closed else 0]], steps]), np.vstack([steps, steps[[0 if closed else -1]]])
+    return np.asarray(np.abs(np.degrees(np.arctan2(_cross(before, after), (before * after).sum(axis=1)))))
+
+
+def _farthest(points: Floats, others: Floats) -> int:
+    """The point of a line that lies farthest from any of some others."""
+    nearest = [float(np.linalg.norm(others - point, axis=1).min()) for point in points]
+    return int(np.argmax(nearest))
 
 
 def chains(edges: Ints) -> list[Ints]:

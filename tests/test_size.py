@@ -11,11 +11,11 @@ BESIDE = {tokenize.COMMENT, tokenize.NL}
 LAYOUT = {tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 #: Lines and tokens of code of the three packages together at most; comments, docstrings and layout are no tokens.
-LINES, TOKENS = 58_300, 420_000
+LINES, TOKENS = 58_300, 424_000
 
 #: Lines of each package at most, those of packages inside it apart: a tenth more than it has.
 BUDGET = {
-    "fem1d2d": 4700,
+    "fem1d2d": 4900,
     "ndtheory": 6900,
     "verification": 1400,
     "verification.algorithm": 3650,

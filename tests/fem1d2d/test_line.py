@@ -54,8 +54,35 @@ def test_corners_pieces_and_closed_lines_are_refused_with_the_place():
         Line.along(joined("top", "right"), "line", left=False)
     with pytest.raises(MeshError, match="several pieces"):
         Line.along(joined("top", "bottom"), "line", left=False)
-    with pytest.raises(MeshError, match="closed"):
+    with pytest.raises(MeshError, match=r"corner of side 'line' at \(2, 0\) has 90 degrees"):
         Line.along(joined("top", "bottom", "left", "right"), "line", left=True)
+    with pytest.raises(MeshError, match="side 'circle' is closed: needed a line with two ends"):
+        Line.along(disc(24), "circle", left=True)
+
+
+def disc(cells):
+    """A disc of radius 1 with the side circle."""
+    angles = 2 * np.pi * np.arange(cells) / cells
+    points = np.vstack([np.column_stack([np.cos(angles), np.sin(angles)]), [[0, 0]]])
+    edges = np.column_stack([np.arange(cells), np.roll(np.arange(cells), -1)])
+    triangles = np.column_stack([edges, np.full(cells, cells)])
+    return Mesh(points=points, cells=triangles, sides={"circle": edges})
+
+
+def test_a_side_is_cut_at_its_corners_and_a_closed_one_far_from_given_points():
+    mesh = rectangle((0.0, 2.0), (0.0, 1.0), (4, 2))
+    outline = Mesh(points=mesh.points, cells=mesh.cells, sides={"all": np.concatenate([*mesh.sides.values()])})
+    parts = Line.parts(outline, "all", left=True)
+    ends = [(line.points[0].tolist(), line.points[-1].tolist()) for line in parts]
+    corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
+    first = corners.index(ends[0][0])
+    around = corners[first:] + corners[:first]
+    assert ends == list(zip(around, [*around[1:], around[0]], strict=True))
+    circle = disc(24)
+    [line] = Line.parts(circle, "circle", left=True, away=np.array([[3.0, 0.0]]))
+    assert line.points[0] == pytest.approx([-1, 0], abs=1e-12)
+    assert (line.points[0] == line.points[-1]).all()
+    assert len(line.nodes) == 25
 
 
 def test_a_line_that_comes_back_to_a_node_ends_in_a_refusal():

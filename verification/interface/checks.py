@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fem1d2d import Mesh, depths, largest_strains, rectangle, surface
+from fem1d2d import Mesh, depths, facet_weights, largest_strains, rectangle, surface
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from ndtheory.keys import Part, key
@@ -73,6 +73,20 @@ class Checks(Value, Part):
         why=_whose("largest_strain", "nothing is strained"),
         default=None,
     )
+    cut_length: float | None = key(
+        r"length of the contact bodies' named sides beyond $\Gamma_c$, where the other body does not face them",
+        unit="length",
+        null="without named sides",
+        why=_whose("penetration_outside", "no side is named"),
+        default=None,
+    )
+    cut_depth: float | None = key(
+        "greatest depth of a node of that part inside the other body, in the deformed state; 0 where none would touch",
+        unit="length",
+        null="with it",
+        why=_whose("penetration_outside", "no side is named"),
+        default=None,
+    )
     reason: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
@@ -133,7 +147,8 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
     if bodies.problem.dimension == 1:
         reason = {"penetration_outside": "bars meet at one point, which is Gamma_c"}
         return Checks(largest_strain=strain, strain_at=strain_at, reason=reason, warnings=strained)
-    depth, at = _penetration(bodies, moved)
+    cut, beyond = _cut(bodies) if bodies.problem.named else (None, np.empty(0, dtype=np.int64))
+    depth, at, cut_depth = _penetration(bodies, moved, beyond)
     grid = bodies.interface.contact
     crossed: tuple[str, ...] = ()
     if depth > SHARE * strain * float(np.ptp(grid.x)):
@@ -142,14 +157,37 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
         short = f"Gamma_c, from {low} to {high}, is too short, and the forces are wrong"
         if bodies.interface.several:
             short = "a line of contact is too short or is missing, and the forces are wrong"
+        if cut_depth:
+            short += "; nodes of a named side would touch, at which the other side does not face it as they are drawn"
         crossed = (f"outside Gamma_c the bodies lie in each other, {where}: {short}",)
     return Checks(
         penetration_outside=depth,
         penetration_at=at,
         largest_strain=strain,
         strain_at=strain_at,
+        cut_length=cut,
+        cut_depth=None if cut is None else cut_depth,
         warnings=crossed + strained,
     )
+
+
+def _cut(bodies: TwoBodies) -> tuple[float, Ints]:
+    """Return the length of the contact body's named sides beyond their lines of contact, and the nodes there."""
+    problem, contact = bodies.problem, bodies.problem.contact_body
+    body = bodies.body1 if contact == 1 else bodies.body2
+    assert body is not None
+    length, beyond = 0.0, []
+    for line, one in zip(bodies.interface.lines, problem.contacts, strict=True):
+        assert one.surface is not None
+        [(number, side)] = [
+            pair for pair in zip(one.bodies, one.surface, strict=True) if pair[0] in problem.numbers(contact)
+        ]
+        edges = body.mesh.sides[f"body{number}.{side}" if problem.several else side]
+        s = bodies.interface.contact.x[line.contact]
+        rest = float(facet_weights(body.mesh, edges).sum()) - float(s[-1] - s[0])
+        length += rest if rest > SAME * extent(body.mesh) else 0.0
+        beyond.append(np.setdiff1d(edges, body.nodes[line.contact]))
+    return length, np.concatenate(beyond)
 
 
 def _show(place: Place | None) -> str:
@@ -178,10 +216,11 @@ def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | Non
 class _Surface(Value):
     """The surface of a body in the deformed state.
 
-    ``drawn`` and ``moved``, shape (n, 2), are its nodes outside Gamma_c as they are drawn and where they lie now; its
-    edges run from ``start`` to ``end``, shape (b, 2), with the body on their left.
+    ``drawn`` and ``moved``, shape (n, 2), are its ``nodes`` outside Gamma_c as they are drawn and where they lie now;
+    its edges run from ``start`` to ``end``, shape (b, 2), with the body on their left.
     """
 
+    nodes: Ints
     drawn: Floats
     moved: Floats
     start: Floats
@@ -201,11 +240,14 @@ class _Surface(Value):
             outside = np.setdiff1d(outside, nodes[(x >= ends[0] - slack) & (x <= ends[1] + slack)])
         now = points + u
         start, end = now[boundary[:, 0]], now[boundary[:, 1]]
-        return cls(drawn=points[outside], moved=now[outside], start=start, end=end)
+        return cls(nodes=outside, drawn=points[outside], moved=now[outside], start=start, end=end)
 
 
-def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
-    """Return the greatest depth of a surface node outside Gamma_c inside another body, and where it is drawn."""
+def _penetration(bodies: TwoBodies, moved: Displacements, beyond: Ints) -> tuple[float, Place | None, float]:
+    """Return the greatest depth of a surface node outside Gamma_c inside another body, and where it is drawn.
+
+    The third value is the greatest depth of some nodes of the contact body.
+    """
     problem, grid = bodies.problem, bodies.interface.contact
     ends, mean = grid.x[[0, -1]], grid.upright.mean(axis=0)
     gap, named = float(problem.contact.gap), problem.named
@@ -223,8 +265,8 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
     if not surfaces[1]:
         assert bodies.body1 is not None
         surfaces[1] = [_obstacle(problem.body2, bodies.body1, surfaces[0][0], ends, lift, upper=False)]
-    deepest, at = 0.0, None
-    every = [*surfaces[0], *surfaces[1]]
+    deepest, at, of_cut = 0.0, None, 0.0
+    every, own_surfaces = [*surfaces[0], *surfaces[1]], surfaces[problem.contact_body - 1]
     rounding = SAME * max(float(np.ptp(surface.start, axis=0).max()) for surface in every)
     for own, other in permutations(every, 2):
         depth = depths(own.moved, other.start, other.end)
@@ -232,7 +274,9 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
             at = tuple(map(float, own.drawn[_first_largest(depth)]))
         if at is not None:
             deepest = max(deepest, float(depth.max(initial=0.0)))
-    return deepest, at
+        if own in own_surfaces:
+            of_cut = max(of_cut, float(depth[np.isin(own.nodes, beyond)].max(initial=0.0)))
+    return deepest, at, of_cut if of_cut > rounding else 0.0
 
 
 def _obstacle(spec: BodySpec, body: Body, opposite: _Surface, ends: Floats, lift: Floats, *, upper: bool) -> _Surface:

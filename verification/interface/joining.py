@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -29,6 +30,9 @@ SNAP = 1e-3
 
 #: Body 1 lies below, body 2 above.
 UPPER = (True, False)
+
+#: Within this part of the smaller extent of the bodies a second part of a side that faces the other body could touch.
+REACH = 0.1
 
 Ends = tuple[float, float]
 
@@ -145,7 +149,7 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
 
     Body 2 lies on the left of the direction of s, so that the normals lead from body 1 to body 2.
     """
-    sides, lines, both = problem.contact.surface, [], []
+    sides, parts, both = problem.contact.surface, [], []
     assert sides is not None
     refuse = lambda needed: problem.refuse("contact.surface", list(sides), needed)
     for i, (side, mesh, held) in enumerate(zip(sides, meshes, known, strict=True)):
@@ -153,20 +157,21 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
         assert held is not None
         if side not in mesh.sides:
             raise refuse(f"body {i + 1} has no side {side!r}; its sides: {', '.join(mesh.sides)}")
-        try:
-            lines.append(Line.along(mesh, side, left=i == 1, mirrored=held.held))
-        except MeshError as error:
-            raise refuse(f"body {i + 1}: {error}") from None
+        opposite = meshes[1 - i]
+        assert opposite is not None
+        away = opposite.points[np.unique(opposite.sides.get(sides[1 - i], opposite.boundary))].astype(float)
+        parts.append(Line.parts(mesh, side, left=i == 1, mirrored=held.held, away=away))
         both.append(mesh)
     contact = problem.contact_body - 1
-    own, other = lines[contact], lines[1 - contact]
+    height = min(float(np.ptp(mesh.points.astype(float), axis=0).min()) for mesh in both)
     try:
-        line = own.facing(other)
+        line, own, other = _facing(parts[contact], parts[1 - contact], sides[contact], REACH * height)
     except MeshError as error:
         needed = f"side {sides[1 - contact]!r} of body {2 - contact} {error}, of {sides[contact]!r}"
         raise refuse(
             f"{needed}: Gamma_c is the one part of the contact body's side that it faces; name other sides or parts"
         ) from None
+    lines = [own, other] if contact == 0 else [other, own]
     seen = line.seen_from(other)
     within, s = line.slack, seen.s
     kept = np.append(s[1:] > within, True) & np.insert(s[:-1] < line.s[-1] - within, 0, True)
@@ -190,12 +195,45 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
         grids = [replace(grid, normals=None) for grid in grids]
     gap = _gap(problem, seen.gap if contact == 0 else -seen.gap, within)
     j = int(np.argmin(gap))
-    height = min(float(np.ptp(mesh.points.astype(float), axis=0).min()) for mesh in both)
     if gap[j] < -MOST_OVERLAP * height:
         depth = f"by {-gap[j]:.4g} at ({line.points[j, 0]:g}, {line.points[j, 1]:g})"
         needed = f"needed an overlap of at most {100 * MOST_OVERLAP:g} % of the smaller extent {height:g}"
         raise refuse(f"the bodies lie in each other {depth}: {needed}")
     return nodes if contact == 0 else nodes[::-1], grids if contact == 0 else grids[::-1], P, gap
+
+
+def _facing(own: list[Line], others: list[Line], side: str, reach: float) -> tuple[Line, Line, Line]:
+    """Find the part of one side that another side faces: Gamma_c with normals between both, and the two parts.
+
+    Of several parts that face each other it is the nearest one; within ``reach`` there must be no second one.
+
+    Raises
+    ------
+    MeshError
+        None of them faces another one, or a second one is near.
+    """
+    found: list[tuple[float, Line, Line, Line]] = []
+    why: list[MeshError] = []
+    for one, other in product(own, others):
+        try:
+            line = one.facing(other)
+            found.append((float(np.abs(line.seen_from(other).gap).min()), line, one, other))
+        except MeshError as error:
+            closed = all(each.nodes[0] == each.nodes[-1] for each in (one, other))
+            why.append(MeshError(f"{error}; both lines are closed: needed parts with two ends") if closed else error)
+    if not found:
+        raise why[0] if len(why) == 1 else MeshError(f"has no part that faces one as a whole edge, of {len(own)}")
+    found.sort(key=lambda pair: pair[0])
+    (_, line, one, other), near = found[0], [pair for pair in found[1:] if pair[0] <= reach]
+    for _, _, second, _ in near:
+        for before, after in ((one, second), (second, one)):
+            if before.nodes[-1] == after.nodes[0]:
+                raise MeshError(f"faces both sides of a corner: {before.corner(after, side)}")
+        x, y = second.points[len(second.points) // 2]
+        raise MeshError(f"faces another part too, near ({x:g}, {y:g})")
+    if line.nodes[0] == line.nodes[-1]:
+        raise MeshError("faces all of a closed line: needed parts with two ends")
+    return line, one, other
 
 
 def check_profile(problem: Problem, interface: Interface) -> None:

@@ -133,7 +133,7 @@ def test_the_strain_of_bars_is_pressure_over_modulus():
     assert found.checks.largest_strain == pytest.approx(found.contact.pressure[0] / 2, rel=1e-12)
     assert found.checks.penetration_outside is None
     reason = found.to_dict()["checks"]["reason"]
-    assert set(reason) == {"penetration_outside", "penetration_at"}
+    assert set(reason) == {"penetration_outside", "penetration_at", "cut_length", "cut_depth"}
     assert set(reason.values()) == {"bars meet at one point, which is Gamma_c"}
 
 

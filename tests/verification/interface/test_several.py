@@ -7,31 +7,12 @@ import jsonschema
 import numpy as np
 import pytest
 from mesh_writer import write_gmsh22
+from stacks import plate, stack, touch
 
 import verification as vf
 from fem1d2d import rectangle
 from verification.interface.assembly import SingularRole, discretise
 from verification.problem.colours import OddRing, colours
-
-
-def plate(y, young="2e4", cells=8, x=(0, 4), **more):
-    body = {"shape": "rectangle", "x": list(x), "y": list(y), "cells": [cells, 2], "young": young, "poisson": "0.3"}
-    return body | more
-
-
-def touch(one, two, friction="0.3", **more):
-    return {"bodies": [one, two], "surface": ["top", "bottom"], "friction": friction, "radius": 1} | more
-
-
-def stack(cells=(8, 8, 8), frictions=("0.3", "0.2"), **more):
-    """Three plates; the one in the middle floats."""
-    return {
-        "body1": plate((0, 1), cells=cells[0], fixed=["bottom"]),
-        "body2": plate((1, 2), "7e4", cells=cells[1]),
-        "body3": plate((2, 3), cells=cells[2], prescribed={"top": ["0.001", "-0.01"]}),
-        "contact": [touch(1, 2, frictions[0]), touch(2, 3, frictions[1])],
-        "iteration": {"theta": "auto"},
-    } | more
 
 
 def pairs(**more):
@@ -361,39 +342,6 @@ def test_what_does_not_fit_is_refused_by_the_number_of_its_body(change, key, nee
     assert caught.value.key == key
     assert needed in caught.value.needed
     assert str(caught.value).isprintable()
-
-
-def test_two_contacts_of_one_body_have_no_common_node():
-    corner = stack(
-        body3=plate((1, 2), x=(4, 5), fixed=["right"]) | {"cells": [4, 8]}, contact=[touch(1, 2), touch(2, 3, surface=["right", "left"])]
-    )
-    middle = plate((1, 2), "7e4", prescribed={"top": ["0.001", "-0.01"]}) | {"cells": [8, 4]}
-    shared = r"contact\[2\]\.surface = .*two contacts share the node of body 2 at \(4, 1\): needed sides, or parts"
-    with pytest.raises(vf.ProblemError, match=shared):
-        vf.build(read(corner | {"body2": middle}))
-    above = {"parts": {"flank": {"side": "right", "y": ["1.25", "1.75"]}}}  # an edge above the corner
-    touching = [touch(1, 2), touch(2, 3, surface=["flank", "left"])]
-    apart = read(corner | {"body2": middle | above, "contact": touching})
-    run, found = vf.run(apart), vf.solve(apart)
-    assert run.converged
-    assert close(run.contact.pressure, found.contact.pressure)
-
-
-def test_two_contacts_of_one_side_are_those_of_its_parts():
-    """A beam on two supports: its bottom faces each of them with other nodes."""
-    feet = {f"body{i}": plate((0, 1), x=x, fixed=["bottom"]) for i, x in ((1, (0, 1)), (3, (3, 4)))}
-    beam = plate((1, 2), "7e4", prescribed={"top": ["0.001", "-0.01"]})
-    parts = {"west": {"side": "bottom", "x": [0, 1]}, "east": {"side": "bottom", "x": [3, 4]}}
-    found = []
-    for sides in (("bottom", "bottom"), ("west", "east")):
-        contact = [touch(one, 2, surface=["top", side]) for one, side in zip((1, 3), sides, strict=True)]
-        problem = read({**feet, "body2": beam | {"parts": parts}, "contact": contact, "iteration": {"theta": "auto"}})
-        found += [vf.run(problem).contact, vf.solve(problem).contact]
-    for one in found[1:]:
-        assert close(one.pressure, found[0].pressure)
-    lines = np.array(found[0].interface)
-    assert (lines[np.array(found[0].x) <= 1] == 0).all()
-    assert (lines[np.array(found[0].x) >= 3] == 1).all()
 
 
 @pytest.mark.parametrize(
