@@ -85,26 +85,33 @@ class Line:
             Points far from which a closed line without a corner begins and ends.
         """
         on_boundary, on_side = (undirected(edges, len(mesh.points)) for edges in (mesh.boundary, mesh.sides[side]))
-        edges = mesh.boundary[np.isin(on_boundary, on_side)]
-        found = []
-        for nodes in chains(edges if left else edges[:, ::-1]):
-            points = mesh.points[nodes].astype(float)
-            turns = _turns(points)
-            if nodes[0] == nodes[-1]:
-                sharpest = int(np.argmax(turns[:-1]))
-                if turns[sharpest] <= SHARPEST and away is not None:
-                    sharpest = _farthest(points[:-1], away)
-                nodes = np.append(np.roll(nodes[:-1], -sharpest), nodes[sharpest])
-                turns = np.append(np.roll(turns[:-1], -sharpest), turns[sharpest])
-            cuts = np.flatnonzero(turns[1:-1] > SHARPEST) + 1
-            for begin, end in pairwise([0, *cuts.tolist(), len(nodes) - 1]):
-                found.append(cls._through(mesh, nodes[begin : end + 1], mirrored))
-        return found
+        edges, points = mesh.boundary[np.isin(on_boundary, on_side)], mesh.points.astype(float)
+        pieces = chains(edges if left else edges[:, ::-1])
+        return [line for nodes in pieces for line in cls._cut(nodes, points, mirrored, away)]
 
     @classmethod
-    def _through(cls, mesh: Mesh, nodes: Ints, mirrored: NDArray[np.bool_] | None) -> Line:
+    def through(cls, points: Floats, *, away: Floats | None = None) -> list[Line]:
+        """Cut a line through given points, shape (n, 2), as a side is cut; parameters as of :meth:`parts`."""
+        nodes = np.arange(len(points))
+        nodes[-1] = 0 if (points[0] == points[-1]).all() else nodes[-1]
+        return cls._cut(nodes, points, None, away)
+
+    @classmethod
+    def _cut(cls, nodes: Ints, points: Floats, mirrored: NDArray[np.bool_] | None, away: Floats | None) -> list[Line]:
+        turns = _turns(points[nodes])
+        if nodes[0] == nodes[-1]:
+            first = int(np.argmax(turns[:-1]))
+            if turns[first] <= SHARPEST and away is not None:
+                first = _farthest(points[nodes[:-1]], away)
+            nodes, turns = (np.append(np.roll(values[:-1], -first), values[first]) for values in (nodes, turns))
+        cuts = np.flatnonzero(turns[1:-1] > SHARPEST) + 1
+        ends = pairwise([0, *cuts.tolist(), len(nodes) - 1])
+        return [cls._smooth(nodes[begin : end + 1], points, mirrored) for begin, end in ends]
+
+    @classmethod
+    def _smooth(cls, nodes: Ints, every: Floats, mirrored: NDArray[np.bool_] | None) -> Line:
         """The line through nodes that follow each other."""
-        points = mesh.points[nodes].astype(float)
+        points = every[nodes]
         steps = np.diff(points, axis=0)
         lengths = np.linalg.norm(steps, axis=1)
         steps /= lengths[:, None]
@@ -172,6 +179,7 @@ class Line:
             if settled:
                 break
         met, faces = between._meetings(other)
+        faces &= (self.normals * other.normals_at(met)).sum(axis=1) > SAME  # lines at a right angle face nothing
         begins = np.flatnonzero(np.diff(faces.astype(int), prepend=0) == 1)
         ends = np.flatnonzero(np.diff(faces.astype(int), append=0) == -1)
         whole = [slice(begin, end + 1) for begin, end in zip(begins, ends, strict=True) if end > begin]

@@ -18,6 +18,7 @@ from verification.figures import style
 from verification.figures.style import BODIES, FILLS, PRESSURE, SHEAR, legend_beside, mark_states, plain
 from verification.interface.assembly import TwoBodies
 from verification.interface.fields import ContactFields
+from verification.interface.joining import obstacle_edges
 from verification.registry import draw as main_figure
 
 #: Stresses that colour the cells: what the colour bar calls them, and their values from the tensors.
@@ -114,11 +115,18 @@ def _placed(bodies: TwoBodies, moved: Sequence[Floats], scale: float) -> list[Fl
     return found
 
 
-def _obstacle(bodies: TwoBodies, scale: float) -> float:
-    """The height at which the face of the obstacle is drawn: a flat gap is scaled."""
+def _obstacle(bodies: TwoBodies, scale: float) -> Floats:
+    """The face of the obstacle as it is drawn, shape (n, 2): a flat gap is scaled, and what has no ends is endless."""
     (body,), gap = bodies.elastic, bodies.interface.gap
+    spec = bodies.problem.body1 if bodies.body1 is None else bodies.problem.body2
+    if spec.face:
+        return np.array(spec.face)
     sign = -1.0 if bodies.body1 is None else 1.0
-    return float(body.mesh.points[body.nodes[0], 1] + sign * gap[0] * (scale if np.ptp(gap) == 0 else 1.0))
+    height = float(body.mesh.points[body.nodes[0], 1] + sign * gap[0] * (scale if np.ptp(gap) == 0 else 1.0))
+    x = body.mesh.points[:, 0]
+    beyond = 2 * float(np.ptp(x))
+    low, high = (x.min() - beyond, x.max() + beyond) if spec.x is None else (float(end) for end in spec.x)
+    return np.array([[low, height], [high, height]])
 
 
 def _overlap(bodies: TwoBodies, drawn: list[Floats], scale: float) -> float:
@@ -126,8 +134,13 @@ def _overlap(bodies: TwoBodies, drawn: list[Floats], scale: float) -> float:
     if bodies.problem.dimension == 1:
         return 0.0
     if len(drawn) == 1:
-        beyond = drawn[0][bodies.elastic[0].nodes, 1] - _obstacle(bodies, scale)
-        return float((-beyond if bodies.body1 is None else beyond).max())
+        own = drawn[0][bodies.elastic[0].nodes]
+        spec, upper = (bodies.problem.body1, True) if bodies.body1 is None else (bodies.problem.body2, False)
+        if spec.face:
+            size, grid = float(np.ptp(drawn[0], axis=0).max()), bodies.interface.contact
+            return float(depths(own, *obstacle_edges(spec, size, grid, upper=upper)).max())
+        beyond = own[:, 1] - _obstacle(bodies, scale)[0, 1]
+        return float((-beyond if upper else beyond).max())
     edges = [points[body.mesh.boundary.T] for body, points in zip(bodies.elastic, drawn, strict=True)]
     return max(float(depths(own[0], *other).max()) for own, other in (edges, edges[::-1]))
 
@@ -138,8 +151,12 @@ def _ends(bodies: TwoBodies, drawn: list[Floats], scale: float, contact: Contact
     x = np.array([points[:, 0].min(), points[:, 0].max()])
     if bodies.problem.dimension == 1:
         return x + 0.04 * np.ptp(x) * BOTH, 0.1 + 0.15 * np.ptp(x) * BOTH
-    heights = [*points[:, 1], _obstacle(bodies, scale)] if len(drawn) == 1 else points[:, 1]
-    y = np.array([np.min(heights), np.max(heights)])
+    y = np.array([points[:, 1].min(), points[:, 1].max()])
+    if len(drawn) == 1:  # what of the obstacle lies opposite the body, not further away than a fifth of its size
+        face, near = _obstacle(bodies, scale), 0.2 * np.ptp(points, axis=0).max()
+        opposite = face[((face > points.min(axis=0) - near) & (face < points.max(axis=0) + near)).any(axis=1)]
+        seen = np.clip(opposite[:, 1], y[0] - near, y[1] + near)
+        y = np.array([min(y[0], *seen), max(y[1], *seen)])
     if contact is None:
         x, y = x + 0.04 * np.ptp(x) * BOTH, y + 0.06 * np.ptp(y) * BOTH
     else:
@@ -170,13 +187,13 @@ def _draw_meshes(ax: Axes, bodies: TwoBodies, drawn: list[Floats], scale: float)
         return found
     ax.set_ylabel(f"y [{length}]")
     if len(drawn) == 1:
-        ax.axhline(_obstacle(bodies, scale), color="0.3", linewidth=2, label="obstacle")
+        ax.plot(*_obstacle(bodies, scale).T, color="0.3", linewidth=2, label="obstacle")
     return found
 
 
 def _draw_tractions(ax: Axes, contact: ContactFields, bodies: TwoBodies, drawn: list[Floats]) -> None:
     """Arrows of the tractions on body 2 from the contact nodes, the longest a tenth of the picture."""
-    body, traction = bodies.problem.contact_body - 1, contact.tractions
+    body, traction = min(bodies.problem.contact_body, len(drawn)) - 1, contact.tractions
     largest, size = float(np.linalg.norm(traction, axis=1).max()), float(np.ptp(ax.get_xlim()))
     if largest:
         look: Any = {"angles": "xy", "scale_units": "xy", "width": 0.003, "color": PRESSURE, "zorder": 3}

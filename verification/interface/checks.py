@@ -16,7 +16,8 @@ from ndtheory.keys import Part, key
 from verification.interface.assembly import TwoBodies
 from verification.interface.body import Body
 from verification.interface.fields import ContactFields
-from verification.interface.joining import obstacle_level
+from verification.interface.interface import Grid
+from verification.interface.joining import obstacle_edges, obstacle_level
 from verification.interface.pair import ContactPair
 from verification.machine.threads import one_thread
 from verification.problem.specs import BodySpec
@@ -31,6 +32,8 @@ SHARE = 0.01
 
 #: Two measures of one state are equal up to this part: runs end 1e-9 from the solution, ``solve`` at rounding.
 TIE = 1e-6
+
+NO_NODES: Ints = np.empty(0, dtype=np.int64)
 
 Place = tuple[float, ...]
 Displacements = Sequence[Floats | None]
@@ -147,7 +150,7 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
     if bodies.problem.dimension == 1:
         reason = {"penetration_outside": "bars meet at one point, which is Gamma_c"}
         return Checks(largest_strain=strain, strain_at=strain_at, reason=reason, warnings=strained)
-    cut, beyond = _cut(bodies) if bodies.problem.named else (None, np.empty(0, dtype=np.int64))
+    cut, beyond = _cut(bodies) if bodies.problem.named else (None, NO_NODES)
     depth, at, cut_depth = _penetration(bodies, moved, beyond)
     grid = bodies.interface.contact
     crossed: tuple[str, ...] = ()
@@ -249,7 +252,7 @@ def _penetration(bodies: TwoBodies, moved: Displacements, beyond: Ints) -> tuple
     The third value is the greatest depth of some nodes of the contact body.
     """
     problem, grid = bodies.problem, bodies.interface.contact
-    ends, mean = grid.x[[0, -1]], grid.upright.mean(axis=0)
+    mean = grid.upright.mean(axis=0)
     gap, named = float(problem.contact.gap), problem.named
     lift = gap * mean / np.linalg.norm(mean) if gap else np.zeros(2)  # of body 2
     surfaces: list[list[_Surface]] = [[], []]
@@ -261,10 +264,10 @@ def _penetration(bodies: TwoBodies, moved: Displacements, beyond: Ints) -> tuple
             surfaces[i] = [_Surface.of(body.mesh, u + i * lift, lines, cells) for cells in each]
     if not surfaces[0]:
         assert bodies.body2 is not None
-        surfaces[0] = [_obstacle(problem.body1, bodies.body2, surfaces[1][0], ends, 0 * lift, upper=True)]
+        surfaces[0] = [_obstacle(problem.body1, bodies.body2, surfaces[1][0], grid, 0 * lift, upper=True)]
     if not surfaces[1]:
         assert bodies.body1 is not None
-        surfaces[1] = [_obstacle(problem.body2, bodies.body1, surfaces[0][0], ends, lift, upper=False)]
+        surfaces[1] = [_obstacle(problem.body2, bodies.body1, surfaces[0][0], grid, lift, upper=False)]
     deepest, at, of_cut = 0.0, None, 0.0
     every, own_surfaces = [*surfaces[0], *surfaces[1]], surfaces[problem.contact_body - 1]
     rounding = SAME * max(float(np.ptp(surface.start, axis=0).max()) for surface in every)
@@ -279,10 +282,14 @@ def _penetration(bodies: TwoBodies, moved: Displacements, beyond: Ints) -> tuple
     return deepest, at, of_cut if of_cut > rounding else 0.0
 
 
-def _obstacle(spec: BodySpec, body: Body, opposite: _Surface, ends: Floats, lift: Floats, *, upper: bool) -> _Surface:
-    """Return an obstacle as a rectangle that reaches beyond the other body where the problem gives it no end."""
+def _obstacle(spec: BodySpec, body: Body, opposite: _Surface, grid: Grid, lift: Floats, *, upper: bool) -> _Surface:
+    """Return an obstacle, as a rectangle that reaches beyond the other body where the problem gives it no end."""
     low, high = opposite.start.min(axis=0), opposite.start.max(axis=0)
     size = float((high - low).max())
+    if spec.face:
+        start, end = obstacle_edges(spec, size, grid, upper=upper)
+        return _Surface(nodes=NO_NODES, drawn=start[:0], moved=start[:0], start=start + lift, end=end + lift)
+    ends = grid.x[[0, -1]]
     x = (float(low[0]) - size, float(high[0]) + size) if spec.x is None else (float(spec.x[0]), float(spec.x[1]))
     if spec.y is not None:
         y = (float(spec.y[0]), float(spec.y[1]))

@@ -149,21 +149,21 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
 
     Body 2 lies on the left of the direction of s, so that the normals lead from body 1 to body 2.
     """
-    sides, parts, both = problem.contact.surface, [], []
+    sides, parts = problem.contact.surface, []
     assert sides is not None
     refuse = lambda needed: problem.refuse("contact.surface", list(sides), needed)
-    for i, (side, mesh, held) in enumerate(zip(sides, meshes, known, strict=True)):
-        assert mesh is not None
-        assert held is not None
-        if side not in mesh.sides:
+    drawn = []
+    for i, (side, mesh, spec) in enumerate(zip(sides, meshes, (problem.body1, problem.body2), strict=True)):
+        if mesh is not None and side not in mesh.sides:
             raise refuse(f"body {i + 1} has no side {side!r}; its sides: {', '.join(mesh.sides)}")
-        opposite = meshes[1 - i]
-        assert opposite is not None
-        away = opposite.points[np.unique(opposite.sides.get(sides[1 - i], opposite.boundary))].astype(float)
-        parts.append(Line.parts(mesh, side, left=i == 1, mirrored=held.held, away=away))
-        both.append(mesh)
+        drawn.append(np.array(spec.face) if mesh is None else mesh.points[np.unique(mesh.sides[side])].astype(float))
+    for i, (side, mesh, held, away) in enumerate(zip(sides, meshes, known, drawn[::-1], strict=True)):
+        if mesh is None or held is None:  # the body lies on either side of the line, to be seen from the other body
+            parts.append(Line.through(drawn[i], away=away) + Line.through(drawn[i][::-1], away=away))
+        else:
+            parts.append(Line.parts(mesh, side, left=i == 1, mirrored=held.held, away=away))
     contact = problem.contact_body - 1
-    height = min(float(np.ptp(mesh.points.astype(float), axis=0).min()) for mesh in both)
+    height = min(float(np.ptp(mesh.points.astype(float), axis=0).min()) for mesh in meshes if mesh is not None)
     try:
         line, own, other = _facing(parts[contact], parts[1 - contact], sides[contact], REACH * height)
     except MeshError as error:
@@ -178,7 +178,10 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
     s, nodes = s[kept], [line.nodes, other.nodes[kept]]
     P = None
     normals = line.normals_at(s)
-    if _same(line.s, s, within):
+    if meshes[1 - contact] is None:
+        nodes[1] = np.empty(0, dtype=np.int64)
+        grids = [Grid(x=line.s, weights=trapezoid(line.s), points=line.points, normals=line.normals)] * 2
+    elif _same(line.s, s, within):
         # one line for both roles, so that constants have the same digits in both
         alike = bool(kept.all()) and line.alike(own) and own.alike(other)
         own = lines[0] if alike else line
@@ -348,6 +351,25 @@ def obstacle_level(spec: BodySpec, other: Floats | None, *, upper: bool) -> Floa
     if ends is not None:
         return np.array(float(ends[1] if upper else ends[0]))
     return np.array(other[:, -1].min() if upper else other[:, -1].max())
+
+
+def obstacle_edges(spec: BodySpec, size: float, grid: Grid, *, upper: bool) -> tuple[Floats, Floats]:
+    """Return the ends of the edges around an obstacle that is a line or an arc, with the obstacle on their left.
+
+    It is as deep as ``size``, or as the circle inside which it lies.  ``upper`` as of :func:`obstacle_level`.
+    """
+    face, at = np.array(spec.face), grid.points
+    assert at is not None
+    steps = np.gradient(face, axis=0)
+    behind = np.stack([-steps[:, 1], steps[:, 0]], axis=1) / np.linalg.norm(steps, axis=1)[:, None]
+    middle = len(at) // 2
+    near = int(np.argmin(np.linalg.norm(face - at[middle], axis=1)))
+    if behind[near] @ grid.upright[middle] * (-1 if upper else 1) < 0:
+        face, behind = face[::-1], -behind[::-1]
+    inside = spec.circle is not None and behind[0] @ (face[0] - np.array(spec.circle.centre, dtype=float)) < 0
+    deep = min(size, (1 - SAME) * float(spec.circle.radius)) if spec.circle and inside else size
+    around = np.vstack([face, (face + deep * behind)[::-1], face[:1]])
+    return around[:-1], around[1:]
 
 
 def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:

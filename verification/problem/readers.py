@@ -162,6 +162,16 @@ def by_name(value: Any, at: At) -> dict[str, tuple[Fraction, ...]]:
     return {name: table.take(name, lambda given: place(given, at)) for name in names(table)}
 
 
+def polyline(value: Any, at: At) -> tuple[tuple[Fraction, ...], ...]:
+    """Read the points of a line, each with two coordinates, of which neighbours differ."""
+    if not isinstance(value, (list, tuple)) or len(value) < 2:
+        raise Unfit("needed a list of two points or more, as [[0.0, 0.0], [1.0, 0.2]]")
+    found = tuple(place(point, at) for point in value)
+    if any(list(map(float, one)) == list(map(float, other)) for one, other in pairwise(found)):
+        raise Unfit("needed points that differ from the one before")
+    return found
+
+
 def forces_at(value: Any, at: At) -> dict[tuple[Fraction, ...], Components]:
     """Read forces by the points at which they act, in tables of both."""
     if not isinstance(value, (list, tuple)) or not all(isinstance(each, Mapping) for each in value):

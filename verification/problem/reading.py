@@ -43,9 +43,8 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
     around |= {"numbers": bodies}
     contacts = [_read_contact(table, around) for table in _contacts(top, several=several)]
     for i, body in bodies.items():
-        if body.rigid and contacts[0].surface:
-            needed = "needed an elastic body: an obstacle has no named sides (contact.interval takes one)"
-            raise top.refuse(f"body{i}.shape", "rigid", needed)
+        if body.rigid:
+            _check_face(top, i, body, contacts[0].surface)
     around |= {"touching": [contact.bodies for contact in contacts]}
     around |= {"chosen": _colour(top, bodies, around["touching"])} if several else {}
     table = top.table("iteration")
@@ -100,6 +99,24 @@ def _bodies_of_several(top: TomlTable, around: Mapping[str, Any]) -> dict[int, B
             needed = f"needed a modulus within {float(MOST_WITHIN):g} times those before it"
             raise top.refuse(f"body{i}.young", body.young, needed)
     return bodies
+
+
+def _check_face(top: TomlTable, i: int, body: BodySpec, surface: tuple[str, str] | None) -> None:
+    """Refuse an obstacle whose face is not the one that the contact names."""
+    key = f"body{i}.{'circle' if body.circle else 'line' if body.line else 'shape'}"
+    if body.line and body.circle:
+        raise top.refuse(f"body{i}.line", None, "needed either line or circle, not both")
+    if body.face and (body.x or body.y):
+        raise top.refuse(key, None, "needed either x and y, or line or circle, not both")
+    if body.face and not body.side:
+        raise top.refuse(f"body{i}.side", None, "this key is missing: needed a name of the line for contact.surface")
+    if body.face and surface is None:
+        raise top.refuse("contact.surface", None, f"this key is missing: needed it, with {body.side!r} for body{i}")
+    if surface and not body.face:
+        needed = "needed line or circle, and side, which names it (or contact.interval instead of surface)"
+        raise top.refuse(key, "rigid", needed)
+    if surface and surface[i - 1] != body.side:
+        raise top.refuse("contact.surface", list(surface), f"body{i} has the side {body.side!r} only")
 
 
 def _within(bodies: list[BodySpec], most: Fraction) -> bool:

@@ -148,7 +148,33 @@ def _parts(value: Any, at: At) -> dict[str, SidePart]:
     return parts
 
 
+#: Points on an arc of 360 degrees: a smooth curve through them is within 1e-8 radii of the circle.
+ON_CIRCLE = 360
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arc(Entries):
+    """A part of a circle."""
+
+    centre: tuple[Fraction, ...] = entry("its centre", unit="length", reader=readers.place, type="vector")
+    radius: Fraction = entry("its radius", positive, unit="length")
+    arc: tuple[Fraction, Fraction] = entry(
+        "its ends in degrees, anticlockwise from the direction of x", ends, (Fraction(0), Fraction(360)), "degree"
+    )
+
+    @property
+    def points(self) -> list[tuple[float, float]]:
+        """Points on it, from one end to the other; a whole circle ends where it begins."""
+        low, high = map(float, self.arc)
+        count = max(8, math.ceil(ON_CIRCLE * min(high - low, 360.0) / 360))
+        turns = [math.radians(low + (high - low) * i / count) for i in range(count + 1)]
+        x, y = map(float, self.centre)
+        found = [(x + float(self.radius) * math.cos(a), y + float(self.radius) * math.sin(a)) for a in turns]
+        return [*found[:-1], found[0]] if high - low >= 360 else found
+
+
 _elastic = lambda at: at["shape"] != "rigid"
+_drawn_rigid = lambda at: not _elastic(at) and at["dimension"] == 2
 #: What the loads have in common: none of a rigid body, and they come last in a table.
 _LOAD: dict[str, Any] = {"only": _elastic, "order": LAST}
 _ON_SIDES: dict[str, Any] = {**_LOAD, "default": EMPTY, "initial": ReadOnly(), "type": "map of vector"}
@@ -216,8 +242,8 @@ class BodySpec(Loads):
     Attributes
     ----------
     shape : {'rectangle', 'interval', 'mesh', 'rigid', 'union'}
-        A rigid body is an obstacle: of the other attributes it has at most x and y.  A union has only members, plane
-        and the moduli, see :meth:`union`.
+        A rigid body is an obstacle: of the other attributes it has at most x and y, or line or circle, and side.  A
+        union has only members, plane and the moduli, see :meth:`union`.
     young, poisson : Fraction
         E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid, the largest ones of several materials.
     materials : read-only mapping from surface to pair of Fraction
@@ -263,6 +289,25 @@ class BodySpec(Loads):
         write=lambda body: body.split if body.shape == "rectangle" else None,
         later=True,
         absent="with a mesh file, of an obstacle and in one dimension",
+    )
+    line: tuple[tuple[Fraction, ...], ...] = entry(
+        "the face of an obstacle as a line through points, `[[0.0, 0.0], [1.0, 0.2]]`, instead of `x` and `y`",
+        unit="length",
+        reader=readers.polyline,
+        default=(),
+        only=_drawn_rigid,
+        type="list of vector",
+        absent="of other bodies",
+    )
+    circle: Arc | None = entry(
+        "the face of an obstacle as an arc, `{ centre = [0.0, 1.0], radius = 1.0, arc = [240, 300] }`",
+        reader=lambda value, at: read_table(Arc, at.inside(value), dimension=2),
+        default=None,
+        only=_drawn_rigid,
+        absent="of other bodies",
+    )
+    side: str = entry(
+        "the name of that face for `contact.surface`", label, "", only=_drawn_rigid, absent="of other bodies"
     )
     mesh: MeshFile | None = entry(
         "a triangle mesh file instead of `shape`, `x`, `y` and `cells`; its sides are its named lines."
@@ -351,6 +396,11 @@ class BodySpec(Loads):
     def rigid(self) -> bool:
         """True if the body is an obstacle."""
         return self.shape == "rigid"
+
+    @property
+    def face(self) -> list[tuple[float, float]]:
+        """Points of the line or the arc that an obstacle is, empty where it has none."""
+        return self.circle.points if self.circle else [(float(x), float(y)) for x, y in self.line]
 
     @property
     def youngs(self) -> tuple[Fraction, ...]:
