@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
-import meshio
 import numpy as np
 import pytest
 from coupling_logs import linear_run, precice
+from key_problems import obstacles, stack, triangles
 from known import DEAR, continuum_once, once, repeated_once
 from made_up import Halfway
 from shared import Shared
@@ -157,26 +157,6 @@ def small(folder: Path) -> vf.Problem:
     return problem
 
 
-def triangles(path: Path) -> None:
-    """A unit square of two triangles below the x axis, with a named bottom and a named surface."""
-    points = [(0, -1, 0), (1, -1, 0), (1, 0, 0), (0, 0, 0)]
-    cells = [("line", [[0, 1]]), ("triangle", [[0, 1, 2], [0, 2, 3]])]
-    tags = [np.array([1]), np.array([9, 9])]
-    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    names = {"bottom": np.array([1, 1]), "square": np.array([9, 2])}
-    mesh = meshio.Mesh(np.array(points, float), cells, cell_data=data, field_data=names)
-    meshio.write(path, mesh, file_format="gmsh22", binary=False)
-
-
-def stack() -> vf.Problem:
-    """Three plates."""
-    plate = {"shape": "rectangle", "x": [0, 2], "cells": [2, 1], "young": 1, "poisson": "0.3"}
-    bodies = {f"body{i}": {**plate, "y": [i - 1, i]} for i in (1, 2, 3)}
-    bodies["body1"]["fixed"], bodies["body3"]["prescribed"] = ["bottom"], {"top": [0, "-0.1"]}
-    touch = {"surface": ["top", "bottom"], "friction": "0.3", "radius": 1}
-    return vf.Problem.from_dict({**bodies, "contact": [{**touch, "bodies": [i, i + 1]} for i in (1, 2)]})
-
-
 def diverging(folder: Path) -> list[tuple[Path, str]]:
     """A log of a tied run that diverges, absolute and relative, its last line cut off."""
     absolute, relative = linear_run([1, 3], 0.8, 40)
@@ -281,6 +261,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         vf.run(bars.changed(theta="0.99"), rule="momentum"),
         vf.run(small.changed(young=(70000, 20000000)), theta="0.99"),  # diverges
         *(vf.solve(problem) for problem in (small, bars, of_mesh, vf.example("signorini"), stack())),
+        *(vf.solve(vf.Problem.from_dict(data)) for data in obstacles()),
         *histories(small),
         *(vf.measure(problem) for problem in (bars, matrices)),
         vf.measure(small, refine=1),

@@ -160,11 +160,13 @@ def _ends(bodies: TwoBodies, drawn: list[Floats], scale: float, contact: Contact
     if contact is None:
         x, y = x + 0.04 * np.ptp(x) * BOTH, y + 0.06 * np.ptp(y) * BOTH
     else:
-        touching = np.array(contact.status) != "open"
-        ends = contact.x[touching] if touching.any() else contact.x
-        x = np.array([ends.min(), ends.max()]) + 3 * np.diff(contact.x).max() * BOTH
-        surface = drawn[0][bodies.elastic[0].nodes]
-        y = surface[(surface[:, 0] > x[0]) & (surface[:, 0] < x[1]), 1].mean() + 0.2 * np.ptp(x) * BOTH
+        body, touching = min(bodies.problem.contact_body, len(drawn)) - 1, np.array(contact.status) != "open"
+        line = drawn[body][bodies.elastic[body].nodes]
+        part = line[touching] if touching.sum() > 1 else line
+        centre, size = (part.min(axis=0) + part.max(axis=0)) / 2, np.ptp(part, axis=0)
+        around = 3 * float(np.linalg.norm(np.diff(part, axis=0), axis=1).max())
+        x = centre[0] + (size.max() / 2 + around) * BOTH
+        y = centre[1] + max(0.2 * np.ptp(x), size[1] / 2 + around) * BOTH
     return x + max(0.0, np.ptp(y) / TALL - np.ptp(x)) / 2 * BOTH, y
 
 

@@ -225,7 +225,7 @@ def _facing(own: list[Line], others: list[Line], side: str, reach: float) -> tup
             closed = all(each.nodes[0] == each.nodes[-1] for each in (one, other))
             why.append(MeshError(f"{error}; both lines are closed: needed parts with two ends") if closed else error)
     if not found:
-        raise why[0] if len(why) == 1 else MeshError(f"has no part that faces one as a whole edge, of {len(own)}")
+        raise why[0] if len(why) == 1 else MeshError("has no part that faces one as a whole edge")
     found.sort(key=lambda pair: pair[0])
     (_, line, one, other), near = found[0], [pair for pair in found[1:] if pair[0] <= reach]
     for _, _, second, _ in near:

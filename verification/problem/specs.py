@@ -307,7 +307,12 @@ class BodySpec(Loads):
         absent="of other bodies",
     )
     side: str = entry(
-        "the name of that face for `contact.surface`", label, "", only=_drawn_rigid, absent="of other bodies"
+        "the name of that face for `contact.surface`",
+        label,
+        "",
+        only=_drawn_rigid,
+        write=lambda body: body.side or None,
+        absent="of other bodies",
     )
     mesh: MeshFile | None = entry(
         "a triangle mesh file instead of `shape`, `x`, `y` and `cells`; its sides are its named lines."

@@ -285,7 +285,7 @@ def test_what_does_not_fit_is_refused_in_one_line(tmp_path):
         ),
         ("contact.interval", "[-0.5, 0.5]", "needed either surface or interval, not both"),
         ("contact.surface", '["top"]', "two names of sides"),
-        ("body1", {"shape": "rigid"}, "an obstacle has no named sides"),
+        ("body1", {"shape": "rigid"}, "needed line or circle, and side"),
         ("body2.prescribed.left", '[0, "free"]', free),
     ):
         with pytest.raises(ProblemError, match=message) as caught:

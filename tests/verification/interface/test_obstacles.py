@@ -1,0 +1,140 @@
+"""Obstacles whose face is a line or an arc: closed forms, laws of turning and mirroring, refusals."""
+
+import numpy as np
+import pytest
+from mesh_writer import write_gmsh22
+
+import verification as vf
+from fem1d2d import rectangle
+
+WHEEL = {"centre": [0, 3], "radius": 3, "arc": [240, 300]}
+BLOCK = {"shape": "rectangle", "x": [-2, 2], "y": [-2, 0], "cells": [80, 40], "split": "both", "young": 1000}
+BLOCK |= {"poisson": "0.3", "prescribed": {"bottom": [0, "0.02"]}}
+
+
+def pressed(face, block=BLOCK, **contact):
+    """A block that is pressed up against an obstacle."""
+    obstacle = {"shape": "rigid", "side": "face", **face}
+    return vf.Problem.from_dict({"body1": block, "body2": obstacle, "contact": {"surface": ["top", "face"]} | contact})
+
+
+def test_a_wheel_on_a_block_has_the_pressure_of_hertz():
+    """The largest pressure follows from the force, which the bottom brings about; measured: 2.3e-4 of it."""
+    found = vf.solve(pressed({"circle": WHEEL}))
+    force, modulus = found.contact.force["normal"], 1000 / (1 - 0.3**2)
+    assert found.contact.pressure.max() == pytest.approx(np.sqrt(force * modulus / (np.pi * 3)), rel=3e-4)
+    half = 2 * np.sqrt(force * 3 / (np.pi * modulus))
+    inner = np.abs(found.contact.s - 1.6) <= 0.8 * half
+    slope, height = np.polyfit((found.contact.s[inner] - 1.6) ** 2, found.contact.pressure[inner] ** 2, 1)
+    assert np.sqrt(-height / slope) == pytest.approx(half, rel=0.02)
+    assert found.contact.pressure == pytest.approx(found.contact.pressure[::-1], rel=1e-9)
+    assert found.checks.penetration_outside == 0
+
+
+@pytest.mark.parametrize("face", [
+    {"circle": {"centre": [0, 3], "radius": 3}},
+    {"line": [[3 * np.sin(a), 3 - 3 * np.cos(a)] for a in np.linspace(-0.5, 0.5, 41)]},
+    {"line": [[3 * np.sin(a), 3 - 3 * np.cos(a)] for a in np.linspace(0.5, -0.5, 41)]},
+])  # fmt: skip
+def test_a_whole_circle_and_points_on_it_in_either_order_are_the_same_wheel(face):
+    """A smooth curve through points 1.4 degrees apart; measured: 1.5e-5 of the pressure."""
+    one, other = vf.solve(pressed({"circle": WHEEL})).contact, vf.solve(pressed(face)).contact
+    assert other.pressure.max() == pytest.approx(one.pressure.max(), rel=3e-5)
+    assert other.force["normal"] == pytest.approx(one.force["normal"], rel=3e-5)
+
+
+def test_a_level_line_is_the_obstacle_with_an_interval():
+    block = BLOCK | {"cells": [16, 8]}
+    level = vf.solve(pressed({"line": [[-1, 0], [1, 0]]}, block, friction="0.2", radius="0.5"))
+    other = {"body1": block, "body2": {"shape": "rigid", "x": [-1, 1], "y": [0, 1]}}
+    drawn = vf.solve(
+        vf.Problem.from_dict(other | {"contact": {"interval": [-1, 1], "friction": "0.2", "radius": "0.5"}})
+    )
+    assert level.contact.pressure == pytest.approx(drawn.contact.pressure, rel=1e-12)
+    assert level.contact.shear == pytest.approx(drawn.contact.shear, abs=1e-9 * abs(drawn.contact.shear).max())
+
+
+@pytest.mark.parametrize("angle", [0.7, np.pi])
+def test_an_obstacle_that_is_turned_with_the_body_has_the_same_pressure(angle, tmp_path):
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    flat = rectangle((-2.0, 2.0), (-2.0, 0.0), (16, 8))
+    faces, found = [[a, a * a / 8] for a in np.linspace(-1, 1, 17)], []
+    for i, by in enumerate((np.eye(2), turn)):
+        write_gmsh22(tmp_path / f"{i}.msh", flat.points @ by, flat.cells, flat.sides)
+        mesh = {"mesh": str(tmp_path / f"{i}.msh"), "young": 1000, "poisson": "0.3"}
+        mesh["prescribed"] = {"bottom": (np.array([0.002, 0.02]) @ by).tolist()}
+        face = {"line": (np.array(faces) @ by).tolist()}
+        found.append(vf.solve(pressed(face, mesh, friction="0.3", radius="0.5")).contact)
+    largest = found[0].pressure.max()
+    assert found[1].pressure == pytest.approx(found[0].pressure, abs=1e-8 * largest)
+    assert found[1].shear == pytest.approx(found[0].shear, abs=1e-8 * largest)
+    assert largest > 0
+
+
+def test_a_body_in_a_bowl_is_held_by_its_corners():
+    bowl = {"shape": "rigid", "side": "bowl", "circle": {"centre": [0, 5], "radius": 5, "arc": [240, 300]}}
+    above = {"shape": "rectangle", "x": [-1, 1], "y": ["0.102", 1], "cells": [20, 10], "young": 1000, "poisson": "0.3"}
+    above["prescribed"] = {"top": [0, "-0.02"]}
+    data = {"body1": bowl, "body2": above, "contact": {"surface": ["bowl", "bottom"]}}
+    found = vf.solve(vf.Problem.from_dict(data))
+    assert np.flatnonzero(found.contact.pressure).tolist() == [0, 20]
+    assert found.contact.pressure[0] == pytest.approx(found.contact.pressure[-1], rel=1e-9)
+    assert found.checks.penetration_outside == 0
+    assert found.plot().axes
+
+
+def test_a_wedge_that_ends_over_a_block_touches_beside_its_end_only():
+    found = vf.solve(pressed({"line": [["-1.5", "0.3"], ["1.0", 0]]}))
+    touching = np.flatnonzero(found.contact.pressure)
+    assert found.contact.x[touching].min() > 0.8
+    assert found.contact.x[touching].max() <= 1.0
+
+
+REFUSED = {
+    "two faces": ({"line": [[0, 0], [1, 0]], "circle": WHEEL}, r"body2\.line: needed either line or circle"),
+    "no name": ({"line": [[0, 0], [1, 0]], "side": ""}, r"body2\.side: this key is missing"),
+    "another name": ({"line": [[0, 0], [1, 0]], "side": "rim"}, r"contact\.surface = .*body2 has the side 'rim' only"),
+    "ends too": ({"line": [[0, 0], [1, 0]], "x": [0, 1]}, r"body2\.line: needed either x and y, or line or circle"),
+    "one point": ({"line": [[0, 0]]}, r"body2\.line = .*needed a list of two points or more"),
+    "a point twice": ({"line": [[0, 0], [0, 0], [1, 0]]}, r"body2\.line = .*points that differ"),
+    "no radius": ({"circle": {"centre": [0, 0]}}, r"body2\.circle\.radius: this key is missing"),
+    "a negative one": (
+        {"circle": {"centre": [0, 0], "radius": -1}},
+        r"body2\.circle\.radius = -1: needed a number > 0",
+    ),
+    "no face": ({}, r'body2\.shape = "rigid": needed line or circle, and side'),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_an_obstacle_without_one_named_face_is_refused_by_its_key(name):
+    face, message = REFUSED[name]
+    with pytest.raises(vf.ProblemError, match=message):
+        pressed(face)
+
+
+def test_a_face_that_the_contact_does_not_name_and_one_of_an_elastic_body_are_refused():
+    face = {"shape": "rigid", "side": "face", "line": [[0, 0], [1, 0]]}
+    with pytest.raises(
+        vf.ProblemError, match=r"contact\.surface: this key is missing: needed it, with 'face' for body2"
+    ):
+        vf.Problem.from_dict({"body1": BLOCK, "body2": face})
+    with pytest.raises(vf.ProblemError, match=r"body1\.line: unknown key"):
+        pressed({"circle": WHEEL}, BLOCK | {"line": [[0, 0], [1, 0]]})
+
+
+@pytest.mark.parametrize(("line", "message"), [
+    ([[5, 1], [6, 1]], r"has no part that faces one as a whole edge"),
+    ([[-1, 1], [0, 0], [1, 1]], r"faces another part too"),
+    ([[-1, "-0.5"], [1, "-0.5"]], r"the bodies lie in each other"),
+])  # fmt: skip
+def test_a_face_that_no_edge_meets_once_is_refused(line, message):
+    with pytest.raises(vf.ProblemError, match=message):
+        vf.solve(pressed({"line": line}))
+
+
+def test_a_file_with_an_obstacle_is_written_and_read_back_equal():
+    for face in ({"circle": WHEEL}, {"line": [[0, "1/3"], [1, 0]]}):
+        problem = pressed(face)
+        assert vf.Problem.from_dict(problem.to_dict()) == problem
+        assert problem.digest != pressed({"line": [[0, 0], [1, 0]]}).digest
