@@ -215,7 +215,9 @@ class Line:
         if not faces.all():
             raise MeshError(f"does not face {_at(self.points[np.argmin(faces)])}")
         gap = ((other.curve(met) - self.points) * self.normals).sum(axis=1)
-        return Seen(gap=gap, s=_onto(other.s, met, self.s))
+        s = _onto(other.s, met, self.s)
+        reaches = np.append(s[1:] > self.slack, True) & np.insert(s[:-1] < self.s[-1] - self.slack, 0, True)
+        return Seen(gap=gap, s=s, reaches=reaches)
 
     def _meetings(self, other: Line) -> tuple[Floats, NDArray[np.bool_]]:
         """The positions on another line that normals meet first, and where they do; elsewhere its nearer end."""
@@ -252,10 +254,13 @@ class Seen:
         Distance along the normal at each node, negative where it lies behind.
     s : array, shape (nodes of the other,)
         Positions of its nodes on the one; nodes beyond the ends go on at the pace of the outermost edges.
+    reaches : bool array, shape (nodes of the other,)
+        True for its nodes whose hat functions reach into the one.
     """
 
     gap: Floats
     s: Floats
+    reaches: NDArray[np.bool_]
 
 
 def smooth(known: Floats, values: Floats, x: Floats) -> Floats:

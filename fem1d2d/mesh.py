@@ -230,6 +230,7 @@ def _where(points: NDArray[Any], facet: Ints) -> str:
 
 def undirected(facets: Ints, nodes: int) -> Ints:
     """One number for each facet, the same for both directions."""
+    facets = np.asarray(facets, dtype=np.int64)  # files have smaller integers, whose products overflow
     return np.asarray(facets.min(axis=1) * nodes + facets.max(axis=1) if facets.shape[1] == 2 else facets[:, 0])
 
 

@@ -60,8 +60,7 @@ def from_file(
     """
     path = Path(path)
     try:
-        _check_kind(path)
-        read = _of_group(read_in_process(path), group, path.name)
+        read = _of_group(contents(path), group, path.name)
         if read.split and one_material:
             raise MeshError(read.split)
         other = {"strain": "stress", "stress": "strain"}.get(plane or "", "")
@@ -71,6 +70,20 @@ def from_file(
         return _plane_mesh(read)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
+
+
+def contents(path: Path) -> Read:
+    """Read all of a mesh file, which may hold bodies that lie on each other; the MeshErrors do not name it."""
+    _check_kind(path)
+    return read_in_process(path)
+
+
+def part_of(read: Read, group: Sequence[str]) -> Mesh:
+    """Make the mesh of a body in a file: of some of its named surfaces, or of all cells where none are named.
+
+    MeshError as :func:`from_file`; materials and plane are not checked.
+    """
+    return _plane_mesh(_of_group(read, group))
 
 
 def _check_kind(path: Path) -> None:
@@ -148,7 +161,7 @@ def read_in_process(path: Path) -> Read:
         return Read(found["points"], found["triangles"], found["centres"], sides, groups, *said)
 
 
-def _of_group(read: Read, group: Sequence[str], file: str) -> Read:
+def _of_group(read: Read, group: Sequence[str], file: str = "it") -> Read:
     """The part of a file that some of its named surfaces make; all of it where none are named."""
     if not group:
         return read

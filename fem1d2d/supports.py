@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from fem1d2d.mesh import Floats, Mesh, MeshError, edges, undirected
+from fem1d2d.mesh import Cells, Floats, Mesh, MeshError, edges, undirected
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +110,7 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
     return np.asarray(orthonormal.reshape(n, d, kernel.shape[1]))
 
 
-def pieces(mesh: Mesh, *, hinged: bool = False) -> NDArray[np.int64]:
+def pieces(mesh: Cells, *, hinged: bool = False) -> NDArray[np.int64]:
     """The piece of each cell, shape (c,): cells that share a facet lie in the same one; if ``hinged``, or a node."""
     c = len(mesh.cells)
     facets = mesh.cells.T.reshape(-1, 1) if hinged or mesh.dimension == 1 else edges(mesh.cells)

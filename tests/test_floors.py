@@ -42,8 +42,8 @@ FLOORS: dict[str, dict[str, str]] = {
     "results, extras": {"verification": "document extras schemas"},
     "bodies": {
         "verification.interface": (
-            "__init__ assembly body build checks fields files friction interface join joining matrices pair several "
-            "values"
+            "__init__ assembly body build checks draft drawn fields files friction interface join joining matrices "
+            "pair several values"
         ),
         "verification.contact": "__init__ active_set kkt model step system",
     },
@@ -99,8 +99,8 @@ FLOORS: dict[str, dict[str, str]] = {
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console documents exploring forms layers ledger main marching "
-            "options problems sweeping"
+            "__init__ advising calculator certifying console documents drafting exploring forms layers ledger main "
+            "marching options problems sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },

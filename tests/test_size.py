@@ -11,7 +11,7 @@ BESIDE = {tokenize.COMMENT, tokenize.NL}
 LAYOUT = {tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 #: Lines and tokens of code of the three packages together at most; comments, docstrings and layout are no tokens.
-LINES, TOKENS = 58_300, 424_000
+LINES, TOKENS = 58_800, 427_000
 
 #: Lines of each package at most, those of packages inside it apart: a tenth more than it has.
 BUDGET = {
@@ -28,7 +28,7 @@ BUDGET = {
     "verification.exploration": 850,
     "verification.figures": 1800,
     "verification.free_norm": 1750,
-    "verification.interface": 4400,
+    "verification.interface": 4900,
     "verification.ledger": 4950,
     "verification.machine": 300,
     "verification.output": 650,

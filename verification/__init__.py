@@ -141,6 +141,7 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
             "coupling.advice",
             "exploration.page",
             "free_norm.two_layers",
+            "interface.draft",
             "ledger.rows",
             "reproduce.experiments",
             "sweeps.region",

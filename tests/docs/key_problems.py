@@ -12,13 +12,13 @@ import numpy as np
 import verification as vf
 
 
-def triangles(path: Path) -> None:
-    """A unit square of two triangles below the x axis, with a named bottom and a named surface."""
-    points = [(0, -1, 0), (1, -1, 0), (1, 0, 0), (0, 0, 0)]
-    cells = [("line", [[0, 1]]), ("triangle", [[0, 1, 2], [0, 2, 3]])]
+def triangles(path: Path, side: str = "bottom", low: int = -1) -> None:
+    """A unit square of two triangles, below the x axis or elsewhere, with a named bottom or top and a named surface."""
+    points = [(0, low, 0), (1, low, 0), (1, low + 1, 0), (0, low + 1, 0)]
+    cells = [("line", [[0, 1]] if side == "bottom" else [[2, 3]]), ("triangle", [[0, 1, 2], [0, 2, 3]])]
     tags = [np.array([1]), np.array([9, 9])]
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    names = {"bottom": np.array([1, 1]), "square": np.array([9, 2])}
+    names = {side: np.array([1, 1]), "square": np.array([9, 2])}
     mesh = meshio.Mesh(np.array(points, float), cells, cell_data=data, field_data=names)
     meshio.write(path, mesh, file_format="gmsh22", binary=False)
 

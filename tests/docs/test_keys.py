@@ -241,6 +241,8 @@ def registered(problem: vf.Problem) -> Iterator[dict[str, Any]]:
 def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
     """Documents of every schema: with and without friction, in one dimension, from matrices, of mesh files, of runs."""
     triangles(folder / "square.msh")
+    triangles(folder / "lower.msh", "top", -1)
+    triangles(folder / "upper.msh", "bottom", 0)
     above = {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [1, 1], "young": 1, "poisson": "0.3"}
     of_mesh = vf.Problem.from_dict(
         {
@@ -325,6 +327,7 @@ def test_every_document_fits_its_schema_which_has_its_keys_and_no_other(document
         "example",
         "example section6",
         f"example --inputs {folder / 'inputs'}",
+        f"draft {folder / 'lower.msh'} {folder / 'upper.msh'}",
         f"sweep {folder / 'grid.toml'} --dry-run",
         f"certify {folder / 'small.toml'} --set contact.friction=5",  # no proof
         f"certify {folder / 'small.toml'} --norm lyapunov",

@@ -21,6 +21,7 @@ from verification.cli import (  # noqa: F401  each adds its commands
     calculator,
     certifying,
     documents,
+    drafting,
     exploring,
     layers,
     ledger,

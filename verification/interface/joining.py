@@ -165,7 +165,7 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
     contact = problem.contact_body - 1
     height = min(float(np.ptp(mesh.points.astype(float), axis=0).min()) for mesh in meshes if mesh is not None)
     try:
-        line, own, other = _facing(parts[contact], parts[1 - contact], sides[contact], REACH * height)
+        line, own, other = facing_parts(parts[contact], parts[1 - contact], sides[contact], REACH * height)
     except MeshError as error:
         needed = f"side {sides[1 - contact]!r} of body {2 - contact} {error}, of {sides[contact]!r}"
         raise refuse(
@@ -173,9 +173,8 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
         ) from None
     lines = [own, other] if contact == 0 else [other, own]
     seen = line.seen_from(other)
-    within, s = line.slack, seen.s
-    kept = np.append(s[1:] > within, True) & np.insert(s[:-1] < line.s[-1] - within, 0, True)
-    s, nodes = s[kept], [line.nodes, other.nodes[kept]]
+    within, kept = line.slack, seen.reaches
+    s, nodes = seen.s[kept], [line.nodes, other.nodes[kept]]
     P = None
     normals = line.normals_at(s)
     if meshes[1 - contact] is None:
@@ -205,7 +204,7 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
     return nodes if contact == 0 else nodes[::-1], grids if contact == 0 else grids[::-1], P, gap
 
 
-def _facing(own: list[Line], others: list[Line], side: str, reach: float) -> tuple[Line, Line, Line]:
+def facing_parts(own: list[Line], others: list[Line], side: str, reach: float) -> tuple[Line, Line, Line]:
     """Find the part of one side that another side faces: Gamma_c with normals between both, and the two parts.
 
     Of several parts that face each other it is the nearest one; within ``reach`` there must be no second one.

@@ -68,6 +68,21 @@ def test_of_the_sides_of_a_file_those_parts_are_left_that_lie_on_the_outline(tmp
         from_file(mesh, group=["lower left"])
 
 
+def test_a_body_of_a_file_with_very_many_nodes_keeps_its_sides(tmp_path):
+    """Files have numbers of 32 bits, which are too small for the number of an edge."""
+    mesh = meshio.read(one_file(tmp_path / "both.msh", merged=False))
+    far = np.vstack([np.zeros((60_000, 3)), mesh.points])  # points that no cell uses are left out
+    cells = [(block.type, block.data + 60_000) for block in mesh.cells]
+    moved = meshio.Mesh(far, cells, cell_data=mesh.cell_data, field_data=mesh.field_data)
+    meshio.write(tmp_path / "many.msh", moved, "gmsh22", binary=False)
+    found = from_file(tmp_path / "many.msh", group=["upper"])
+    assert {name: len(facets) for name, facets in found.sides.items()} == {
+        "upper left": 2,
+        "upper bottom": 4,
+        "upper top": 4,
+    }
+
+
 @pytest.mark.parametrize(
     ("group", "needed"), [([], "a name of a surface"), (3, "a name of a surface"), (["a", "a"], "each surface once")]
 )
