@@ -8,7 +8,7 @@ from verification import registry
 from verification.algorithm.monolithic import Solution
 from verification.algorithm.rates import steps
 from verification.algorithm.runs import Run
-from verification.interface.assembly import TwoBodies
+from verification.interface.assembly import TwoBodies, pressure_errors
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Interface
 from verification.interface.values import PointValue, columns_of
@@ -119,6 +119,7 @@ def happened(finished: Run, *, alone: bool) -> Section:
         chosen = f"theta = {float(finished.theta):.4g} is the {finished.choice.source} one"
         parts.append(f"{chosen}: {finished.choice.why}")
     parts += _grids(problem, finished.pair.contact_body, finished.pair.interface)
+    parts += [Labelled("locking", said) for said in pressure_errors(problem, finished.bodies.elastic)]
     nodes = _nodes(problem, finished.contact)
     parts += unfinished(finished, nodes) if finished.unfinished else [Labelled("nodes", nodes)]
     parts += _contact(problem, finished.contact, f"; KKT residual of step II {finished.last.contact.kkt.residual:.1e}")
@@ -148,7 +149,13 @@ def solution(found: Solution) -> Sections:
     runs = len(bodies.elastic) == 2 and not bodies.interface.only_solved
     then = following("run") if runs else following("solve", "-o", "results")
     states = Labelled("nodes", _nodes(problem, found.contact))
-    parts = (*_grids(problem, problem.contact_body, bodies.interface), states, *_contact(problem, found.contact))
+    hints = (Labelled("locking", said) for said in pressure_errors(problem, bodies.elastic))
+    parts = (
+        *_grids(problem, problem.contact_body, bodies.interface),
+        *hints,
+        states,
+        *_contact(problem, found.contact),
+    )
     certified = f"KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c"
     return (
         setting(problem, nodes, bodies.interface.contact.n, cuts),

@@ -14,7 +14,7 @@ import verification as vf
 from fem1d2d import rectangle
 from verification.algorithm.monolithic import contact_system
 from verification.cli.problems import examples
-from verification.interface.assembly import LOCKING, discretise
+from verification.interface.assembly import LOCKING, PRESSURE_ERRORS, RATIOS, discretise
 from verification.interface.friction import SHARE
 
 
@@ -63,6 +63,40 @@ def test_near_one_half_nothing_is_warned_of_where_all_cells_are_split_by_both_di
     for both in (True, False):
         data["body1"]["mesh"] = split(tmp_path / f"{both}.msh", (0.0, 2.0), (-0.3, 0.0), (20, 3), both)
         assert warned(data) == [] if both else "split by both diagonals" in warned(data)[0]
+
+
+def pressures(poisson, cells, diagonals):
+    """Gamma_c of the model of Section 6 with so many cells along it, and one Poisson's ratio."""
+    data = vf.example("section6").to_dict()
+    for name, most in (("body1", (40, 6)), ("body2", (24, 6))):
+        data[name] |= {"poisson": poisson, "cells": [n * cells // 24 for n in most], "split": diagonals}
+    return vf.solve(vf.Problem.from_dict(data)).contact
+
+
+@pytest.mark.parametrize("i", [0, 2, 3])
+def test_the_errors_of_pressure_in_a_hint_are_those_of_the_model(i):
+    """Root mean squares over the middle three quarters, against three times as many cells split by both diagonals."""
+    fine = pressures(str(RATIOS[i]), 72, "both")
+    middle = lambda contact: (contact.x > 0.55) & (contact.x < 1.45)
+    for diagonals, errors in zip(("alternating", "both"), PRESSURE_ERRORS["rectangle"], strict=False):
+        found = pressures(str(RATIOS[i]), 24, diagonals)
+        off = (found.pressure - np.interp(found.x, fine.x, fine.pressure))[middle(found)]
+        size = np.sqrt((fine.pressure[middle(fine)] ** 2).mean())
+        assert 100 * np.sqrt((off**2).mean()) / size == pytest.approx(errors[i], rel=0.05)
+
+
+def test_a_screen_gives_the_error_of_pressure_to_expect_of_the_cells_of_the_file(tmp_path):
+    hint = 'nodal pressures off by about 5 % at nu = 0.48 of body2, 1 % with split = "both"'
+    shown = lambda data: " ".join(str(vf.solve(vf.Problem.from_dict(data)).sections()).split())
+    assert hint in shown(plates(body2={"poisson": "0.48"}))
+    assert hint in " ".join(str(vf.run(vf.Problem.from_dict(plates(body2={"poisson": "0.48"}))).sections()).split())
+    assert "nodal pressures off" not in shown(plates())
+    assert "nodal pressures off" not in shown(plates(body2={"poisson": "0.48", "split": "both"}))
+    data = plates(body1={"poisson": "0.49"})
+    for key in ("shape", "x", "y", "cells"):
+        del data["body1"][key]
+    data["body1"]["mesh"] = split(tmp_path / "one.msh", (0.0, 2.0), (-0.3, 0.0), (20, 3), False)
+    assert "off by about 13 % or more at nu = 0.49 of body1, 0.3 % on quadrilaterals" in shown(data)
 
 
 def test_near_one_half_one_diagonal_multiplies_the_force_and_both_diagonals_do_not_lock(tmp_path):
