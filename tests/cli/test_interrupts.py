@@ -238,7 +238,7 @@ def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
 
     pair_from, built = pair.pair_from, []
 
-    def interrupt(problem, law=None):
+    def interrupt(problem, **options):
         built.append(problem)
         if len(built) == 3:
             signal.raise_signal(signal.SIGINT)

@@ -177,7 +177,7 @@ def test_ctrl_c_wins_over_a_verdict(call, endless, after, monkeypatch, judged):
 
 @pytest.mark.parametrize("command", ["run", "compare", "constants"])
 def test_ctrl_c_before_anything_was_computed_says_so(call, write, monkeypatch, command):
-    def interrupt(problem, law=None):
+    def interrupt(problem, **options):
         signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("verification.interface.pair.pair_from", interrupt)

@@ -318,13 +318,16 @@ class Run(Document):
         return self.pair.on_meshes()
 
     @cached_property
-    def displacements(self) -> tuple[Floats, Floats]:
+    def displacements(self) -> tuple[Floats | None, Floats | None]:
         """Displacement of all nodes of body 1 and body 2 at the last iterate, shape (nodes, d), unit of length.
 
-        ValueError where the pair is made from matrices.
+        None of an obstacle.  ValueError where the pair is made from matrices.
         """
-        first, second = self.traces_at(self.last)
-        return self.pair.body1.mesh_body.displacement(first), self.pair.body2.mesh_body.displacement(second)
+        first, second = (
+            None if side.rigid else side.mesh_body.displacement(trace)
+            for side, trace in zip((self.pair.body1, self.pair.body2), self.traces_at(self.last), strict=True)
+        )
+        return first, second
 
     def traces_at(self, iterate: Iterate) -> tuple[Floats, Floats]:
         """Return the displacements of body 1 and body 2 along Gamma_c at an iterate, normal components along y."""
@@ -481,7 +484,7 @@ def run(
     >>> finished.outcome, finished.iterations
     ('converged', 1)
     """
-    pair = pair_of(problem)
+    pair = pair_of(problem, obstacle=True)
     check_memory(pair)
     relaxation = rule_of(rule or pair.settings.relaxation)
     choice = choose(pair, theta, measured, rule=relaxation)

@@ -61,11 +61,16 @@ def choose(
     ------
     HypothesisError
         A given theta outside (0, 1).
+    ProblemError
+        The Neumann body is an obstacle, and theta is not a number.
     """
     wanted = pair.settings.theta if theta is None else read_theta(theta)
     relaxation = rule_of(rule or pair.settings.relaxation)
     if wanted != "auto" and not relaxation.needs_rho:
         return Choice(theta=wanted, source="given")
+    if pair.neumann.rigid and pair.problem is not None:
+        needed = "needed a number, and a rule that takes it: opposite an obstacle rho is 0, and nothing is predicted"
+        raise pair.problem.refuse("iteration.theta", "auto" if wanted == "auto" else relaxation.name, needed)
     measured = measured or measure(pair)
     energy = energy_bounds(measured)
     assert measured.rho_max is not None  # the two bodies have interface matrices

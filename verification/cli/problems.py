@@ -178,7 +178,7 @@ def run(typed: Typed, solver: Any, start: Path | None, folder: Path | None, as_j
     from verification.sections.run import sections
 
     write = writer(folder, "run")
-    pair = pair_from(problem)
+    pair = pair_from(problem, obstacle=True)
     g = None if start is None else forces(read_vector(start), pair, str(start))
     warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:

@@ -300,10 +300,10 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
     return found
 
 
-def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
+def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True, obstacle: bool = False) -> TwoBodies:
     """Return the bodies on their meshes as the iteration needs them: elastic, and held by their supports.
 
-    Parameters as for :func:`discretise`.
+    Parameters as for :func:`discretise`; with ``obstacle`` one with the Neumann problem may be rigid.
 
     Raises
     ------
@@ -311,10 +311,17 @@ def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True)
         As :func:`verification.interface.pair.pair_from`.
     """
     for name, spec in _specs(problem):
-        if spec.rigid:
-            role = "Neumann" if problem.iteration.neumann_body == int(name[-1]) else "contact"
+        neumann = problem.iteration.neumann_body == int(name[-1])
+        if spec.rigid and obstacle and not neumann:
+            needed = (
+                f"needed {name[-1]}: rho, a ratio of stiffnesses, is infinite where the contact body is rigid; with the"
+                " Neumann problem the obstacle stays where it is"
+            )
+            raise problem.refuse("iteration.neumann_body", problem.iteration.neumann_body, needed)
+        if spec.rigid and not obstacle:
+            role = "Neumann" if neumann else "contact"
             needed = f"needed an elastic body: it has the {role} problem of the iteration"
-            raise problem.refuse(f"{name}.shape", "rigid", f"{needed}; `ndtheory solve` takes obstacles")
+            raise problem.refuse(f"{name}.shape", "rigid", f"{needed}; `ndtheory solve` and `run` take obstacles")
     bodies = discretise(problem, law=law, dense=dense)
     law = bodies.interface.law
     if bodies.interface.only_solved:

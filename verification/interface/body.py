@@ -40,6 +40,9 @@ from verification.value import Value, copied, freeze, lent, original_of
 
 Name = Literal["body1", "body2"]
 
+#: How many times as stiff as the other body an obstacle is in the iteration: what it moves is rounding.
+RIGID = 1e12
+
 #: The traces of no rigid motion.
 NO_MOTIONS: Floats = freeze(np.zeros((0, 0)))
 
@@ -343,6 +346,8 @@ class Condensed(Value):
         Orthonormal traces of the rigid motions that only contact holds: the kernel of S_a; of shape (0, 0) without.
     own_load : array, shape (2 n,), or None
         The l_a of the loads of ``body``; a ``load`` that differs has further forces on Gamma_c.
+    rigid : bool
+        True for an obstacle, which has no body.
     """
 
     grid: Grid
@@ -354,6 +359,19 @@ class Condensed(Value):
     upward: bool = True
     motions: Floats = field(default_factory=lambda: NO_MOTIONS)
     own_load: Floats | None = None
+    rigid: bool = False
+
+    @classmethod
+    def obstacle(cls, other: Condensed) -> Condensed:
+        """Return an obstacle on the grid of the body in contact with it, RIGID times as stiff and without loads.
+
+        The norm (5.21) is then the one of that body, scaled.
+        """
+        zero = np.zeros(other.grid.size)
+        held = other.schur + np.abs(other.schur).max() * (other.motions @ other.motions.T if other.loose else 0.0)
+        return cls(
+            grid=other.grid, schur=RIGID * held, load=zero, known=zero, free=other.free, upward=other.upward, rigid=True
+        )
 
     @property
     def loose(self) -> bool:

@@ -34,6 +34,7 @@ def build(
     transfer: Floats | None = None,
     friction: Any = None,
     neumann_body: Literal[1, 2] = 2,
+    obstacle: bool = False,
 ) -> ContactPair:
     """Make a contact pair from a problem, or from the interface matrices of any code.
 
@@ -68,6 +69,8 @@ def build(
         from the left end of Gamma_c.  It needs a kernel or a law.  With a problem it takes the place of the problem's,
         and may be a table as in its file.
     neumann_body : {1, 2}
+    obstacle : bool
+        Whether a rigid body may have the Neumann problem: :func:`verification.run` takes such a pair.
 
     Returns
     -------
@@ -92,8 +95,8 @@ def build(
         if not isinstance(problem, (str, Path)) or Path(problem).suffix != ".npz":
             problem = problem if isinstance(problem, Problem) else load(problem)
             if friction is not None and not _varies(friction):
-                return pairs.pair_from(problem.changed(friction=friction), law=law)
-            pair = pairs.pair_from(problem, law=law)
+                problem, friction = problem.changed(friction=friction), None
+            pair = pairs.pair_from(problem, law=law, obstacle=obstacle)
             return pair if friction is None else pair.along(friction)
         if law is not None:
             raise ValueError("received a law and an interface file: its operator S is a matrix already")
@@ -155,9 +158,14 @@ def _rubbing(pair: ContactPair, friction: Any) -> ContactPair:
     return pair.along(friction) if _varies(friction) else pair.at(friction=friction)
 
 
-def pair_of(problem: Problem | ContactPair | Path | str) -> ContactPair:
-    """Return the pair that a problem, a file or a pair stands for."""
-    return problem if isinstance(problem, ContactPair) else build(problem)
+def pair_of(problem: Problem | ContactPair | Path | str, *, obstacle: bool = False) -> ContactPair:
+    """Return the pair that a problem, a file or a pair stands for; ``obstacle`` as of :func:`build`."""
+    if not isinstance(problem, ContactPair):
+        return build(problem, obstacle=obstacle)
+    if problem.neumann.rigid and not obstacle:
+        assert problem.problem is not None
+        pairs.pair_from(problem.problem)  # refuses it
+    return problem
 
 
 def _condensed(

@@ -192,7 +192,10 @@ class ContactPair(Value):
             The pair is made from matrices.
         """
         bodies = self.on_meshes().under(problem, slipped)
-        lower, upper = (side.under(body) for side, body in zip((self.body1, self.body2), bodies.elastic, strict=True))
+        lower, upper = (
+            side if body is None else side.under(body)
+            for side, body in ((self.body1, bodies.body1), (self.body2, bodies.body2))
+        )
         contact, neumann = (lower, upper) if self.neumann_body == 2 else (upper, lower)
         interface = copied(self.interface, slipped=bodies.interface.slipped)
         return replace(self, contact=contact, neumann=neumann, interface=interface, problem=problem)
@@ -241,8 +244,8 @@ class ContactPair(Value):
         if self.problem is None:
             raise ValueError("this pair is made from matrices: needed the meshes of both bodies")
         return TwoBodies(
-            body1=self.body1.loaded_body,
-            body2=self.body2.loaded_body,
+            body1=None if self.body1.rigid else self.body1.loaded_body,
+            body2=None if self.body2.rigid else self.body2.loaded_body,
             interface=self.interface_along_y,
             friction=self.friction,
             problem=self.problem,
@@ -321,7 +324,9 @@ class ContactPair(Value):
         return warnings_of(self.interface, self.friction, self._meshed) + path
 
 
-def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
+def pair_from(
+    problem: Problem, *, law: Law | None = None, like: ContactPair | None = None, obstacle: bool = False
+) -> ContactPair:
     """Condense the two bodies of a problem and give them roles, as the iteration and its constants need them.
 
     Parameters
@@ -332,6 +337,8 @@ def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | N
         A law of friction in place of the problem's.
     like : ContactPair, optional
         Its condensed matrices are shared by bodies that are the same, or differ only in Young's modulus and loads.
+    obstacle : bool
+        Whether the body with the Neumann problem may be rigid: it does not move, and only a run takes such a pair.
 
     Raises
     ------
@@ -339,7 +346,7 @@ def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | N
         As :func:`verification.interface.assembly.discretise`, and where a body is rigid, the one with the Neumann
         problem can move rigidly, or rounding leaves no digit of a stiffness on Gamma_c.
     """
-    bodies, iteration = held_bodies(problem, law=law), problem.iteration
+    bodies, iteration = held_bodies(problem, law=law, obstacle=obstacle), problem.iteration
     known = (None, None) if like is None else (like.body1, like.body2)
     upward, grids = iteration.neumann_body == 2, (bodies.interface.contact, bodies.interface.neumann)
     interface = bodies.interface
@@ -347,15 +354,16 @@ def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | N
         if not interface.contact.equals(like.interface.contact):
             raise problem.refuse("contact", None, "needed the contact nodes of the increment, on which it has slipped")
         interface = replace(interface, slipped=like.interface.slipped)
-    lower, upper = (
-        _condensed(body, grid, upward, side)
-        for body, grid, side in zip(bodies.elastic, grids if upward else grids[::-1], known, strict=True)
-    )
-    for name, side in (("body1", lower), ("body2", upper)):
-        _check_digits(problem, name, side)
+    places = zip((bodies.body1, bodies.body2), grids if upward else grids[::-1], known, strict=True)
+    sides = [None if body is None else _condensed(body, grid, upward, side) for body, grid, side in places]
+    for name, side in zip(("body1", "body2"), sides, strict=True):
+        if side is not None:
+            _check_digits(problem, name, side)
+    contact, neumann = sides if upward else sides[::-1]
+    assert contact is not None  # see `held_bodies`
     return ContactPair(
-        contact=lower if upward else upper,
-        neumann=upper if upward else lower,
+        contact=contact,
+        neumann=Condensed.obstacle(contact) if neumann is None else neumann,
         interface=interface if upward else interface.reversed(),
         friction=bodies.friction,
         neumann_body=iteration.neumann_body,

@@ -100,7 +100,8 @@ class Folder:
         _values(room, result.units, columns_of(result.points), sides)
         if isinstance(result, Run):
             _csv(room / "history.csv", "residuals in the norm (5.21), relative ones without unit", result.table())
-            write_interface(result.pair, room / "interface.npz")
+            if not result.pair.neumann.rigid:
+                write_interface(result.pair, room / "interface.npz")
         interface = result.pair.interface_along_y if isinstance(result, Run) else result.bodies.interface
         if not interface.one_grid:
             write_transfer(interface, room / "P.npz")

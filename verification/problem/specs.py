@@ -257,7 +257,8 @@ class BodySpec(Loads):
     part = "Body"
 
     shape: Literal["rectangle", "interval", "mesh", "rigid", "union"] = entry(
-        '`"rectangle"`, in one dimension `"interval"`; `"rigid"` makes the body an obstacle (for `solve`)',
+        '`"rectangle"`, in one dimension `"interval"`; `"rigid"` makes the body an obstacle, for `solve` and, with the'
+        " Neumann problem, for `run`",
         reader=lambda value, at: choice("interval" if at["dimension"] == 1 else "rectangle", "rigid")(value),
         only=_drawn,
         initial="mesh",

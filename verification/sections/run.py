@@ -53,11 +53,12 @@ def sections(finished: Run) -> Sections:
     if finished.problem is None:
         return ()
     nodes, cuts = counted(finished.bodies)
+    after = following("solve") if finished.pair.neumann.rigid else following("compare", iteration=True)
     return (
         setting(finished.problem.with_theta(finished.theta), nodes, finished.pair.contact.grid.n, cuts),
         happened(finished, alone=True),
         *at_points(finished.points, finished.units, finished.unfinished),
-        limits(finished.outside, then(finished, "run", following("compare", iteration=True))),
+        limits(finished.outside, then(finished, "run", after)),
     )
 
 

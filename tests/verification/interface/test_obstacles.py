@@ -6,6 +6,7 @@ from mesh_writer import write_gmsh22
 
 import verification as vf
 from fem1d2d import rectangle
+from verification.cli import main
 
 WHEEL = {"centre": [0, 3], "radius": 3, "arc": [240, 300]}
 BLOCK = {"shape": "rectangle", "x": [-2, 2], "y": [-2, 0], "cells": [80, 40], "split": "both", "young": 1000}
@@ -88,6 +89,55 @@ def test_a_wedge_that_ends_over_a_block_touches_beside_its_end_only():
     touching = np.flatnonzero(found.contact.pressure)
     assert found.contact.x[touching].min() > 0.8
     assert found.contact.x[touching].max() <= 1.0
+
+
+@pytest.mark.parametrize("law", ["local", "nonlocal"])
+@pytest.mark.parametrize("k", [0, "0.3"])
+def test_a_run_against_an_obstacle_ends_where_solve_does(k, law):
+    """Without friction T is constant, so that the error falls by 1 - theta in each step."""
+    moved = BLOCK | {"cells": [40, 20], "prescribed": {"bottom": ["0.002", "0.02"]}}
+    problem = pressed({"circle": WHEEL}, moved, friction=k, law=law, radius="0.4").with_theta("0.7")
+    found, run = vf.solve(problem), vf.run(problem).linearise()
+    assert run.converged
+    largest = found.contact.pressure.max()
+    assert run.contact.pressure == pytest.approx(found.contact.pressure, abs=1e-9 * largest)
+    assert run.contact.shear == pytest.approx(found.contact.shear, abs=1e-7 * largest)
+    assert run.displacements[1] is None
+    assert run.displacements[0] == pytest.approx(found.displacements[0], abs=1e-9)
+    assert run.linearised.rate == pytest.approx(0.3, abs=1e-9 if k == 0 else 0.05)
+    assert run.checks.to_dict()["penetration_outside"] == 0
+    assert run.plot("bodies").axes
+
+
+def test_a_level_obstacle_below_has_the_neumann_problem_too(tmp_path, capsys):
+    above = {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [4, 4], "young": 1000, "poisson": "0.3"}
+    above |= {"prescribed": {"top": ["0.002", "-0.01"]}}
+    contact = {"interval": [0, 1], "friction": "0.3", "radius": "0.5"}
+    data = {"body1": {"shape": "rigid"}, "body2": above, "contact": contact, "iteration": {"neumann_body": 1}}
+    problem = vf.Problem.from_dict(data)
+    found, run = vf.solve(problem).contact, vf.run(problem).contact
+    assert run.pressure == pytest.approx(found.pressure, abs=1e-8 * found.pressure.max())
+    assert run.slip == pytest.approx(found.slip, abs=1e-9)
+    (tmp_path / "my.toml").write_text(problem.to_toml(), "utf-8")
+    assert main(["run", str(tmp_path / "my.toml"), "-o", str(tmp_path / "out")]) == 0
+    assert "Obstacle: lower body" in capsys.readouterr().out
+    assert not (tmp_path / "out" / "interface.npz").exists()
+
+
+def test_what_has_no_meaning_for_an_obstacle_is_refused():
+    problem = pressed({"circle": WHEEL}, BLOCK | {"cells": [8, 4]})
+    run = vf.run(problem)
+    with pytest.raises(vf.ProblemError, match=r"iteration\.neumann_body = 1: needed 2: rho, .*, is infinite"):
+        vf.run(problem.with_keys({"iteration.neumann_body": 1}))
+    with pytest.raises(vf.ProblemError, match=r'iteration\.theta = "auto": needed a number'):
+        vf.run(problem.with_keys({"iteration.theta": "auto"}))
+    for ask in (vf.measure, vf.compare, vf.advise, vf.certify, vf.march):
+        with pytest.raises(vf.ProblemError):
+            ask(problem)
+    for ask in (vf.measure, vf.compare, vf.advise):
+        with pytest.raises(vf.ProblemError, match=r"body2\.shape = \"rigid\": needed an elastic body"):
+            ask(run.pair)
+    assert vf.run(run.pair).iterations == run.iterations
 
 
 REFUSED = {
