@@ -417,8 +417,8 @@ def listed(heading: str) -> dict[str, list[str]]:
 def test_the_page_lists_every_file_that_a_comparison_writes(folder, compared):
     files = listed("## Files")
     written = {path.name for path in (folder / "results").iterdir()}
-    # P.npz only where the grids differ, points.csv where a problem names points
-    others = {"run.json", "solve.json", "ledger.json", "P.npz", "points.csv"}
+    # only where grids differ, points are named, the free norm is asked for
+    others = {"run.json", "solve.json", "ledger.json", "P.npz", "points.csv", "factor.svg", "factor.png"}
     assert written == {name for name, row in files.items() if "compare" in row[0]} - others
     for name in ("contact.csv", "history.csv"):
         lines = (folder / "results" / name).read_text("utf-8").splitlines()

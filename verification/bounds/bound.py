@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from heapq import heappop, heappush
@@ -286,6 +286,11 @@ class Bound(ABC):
         HypothesisError
             theta outside (0, 1).
         """
+
+    def curve(self, subject: Subject, thetas: Sequence[float]) -> list[float | None]:
+        """Return the factor of one step at some thetas, None where none is proved."""
+        found = [self.evaluate(subject, theta).factor for theta in thetas]
+        return [None if factor is None else factor.value for factor in found]
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
         """Trace where the bound proves contraction in the plane of theta and k: by its interval at each friction.

@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 
 from verification.figures.best_theta import draw_best_theta
 from verification.figures.bodies import draw_bodies
-from verification.figures.factor import draw_factor
+from verification.figures.factor import draw_factor, draw_proved
 from verification.figures.history import draw_history
 from verification.figures.proof_map import draw_map
 from verification.figures.region import draw_region
@@ -22,6 +22,7 @@ __all__ = [
     "draw_factor",
     "draw_history",
     "draw_map",
+    "draw_proved",
     "draw_region",
     "draw_reproduction",
     "draw_residuals",

@@ -10,13 +10,15 @@ from matplotlib.figure import Figure
 
 from ndtheory import EnergyConstants, evaluate_energy
 from ndtheory.energy_norms import predicted_factor
+from verification.bounds.bound import Subject
+from verification.comparison import Comparison
 from verification.constants import Measured
 from verification.coupling.advice import Advice
-from verification.figures.style import BODIES, THETA, legend_beside, new_figure, styled
-from verification.registry import draw
+from verification.figures.style import BODIES, THETA, legend_beside, new_figure, plain, styled
+from verification.registry import BOUNDS, draw
 
-#: Thetas of a curve.
-POINTS = 80
+#: Thetas of a curve, and of one that needs a program at each.
+POINTS, PROVED = 80, 19
 
 
 def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
@@ -40,6 +42,34 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
         ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
         ax.set(xlim=(0, 1), ylim=(0, 1.5), xlabel=THETA, ylabel="factor of one step")
         ax.set_title("How much one step changes the distance of two forces")
+        legend_beside(ax)
+    return figure
+
+
+def draw_proved(found: Comparison) -> Figure:
+    """The factor of one step over theta by each bound that a comparison worked out, beside the prediction from rho.
+
+    The free norm is another norm than that of the other curves, and the run's rate is seen in the long run.
+    """
+    thetas = np.linspace(0.05, 0.95, PROVED)
+    subject, rho = Subject.of(found.run.pair, found.measured), found.measured.rho_max
+    with styled():
+        figure = new_figure(7.2, 3.4)
+        ax = figure.subplots()
+        if rho is not None:
+            predicted = [predicted_factor(theta, rho.value) for theta in thetas]
+            ax.plot(thetas, predicted, "--", color="0.5", label=f"predicted, rho = {rho.value:.3g}")
+        for bound in (BOUNDS[result.name] for result in found.computed if not BOUNDS[result.name].finding):
+            factors = [np.nan if q is None else q for q in bound.curve(subject, [float(theta) for theta in thetas])]
+            if not np.isnan(factors).all():
+                ax.plot(thetas, factors, color=bound.colour, linestyle=bound.dashes, label=bound.words)
+        if found.run.observed_rate is not None and found.run.converged:
+            ax.plot(
+                [float(found.run.theta)], [found.run.observed_rate.value], "o", color="0.1", label="rate of the run"
+            )
+        ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
+        ax.set(xlim=(0, 1), ylim=(0, 1.5), xlabel=THETA, ylabel="factor of one step")
+        ax.set_title(f"{plain(found.run.pair.title)}: k = {float(found.run.pair.friction):g}")
         legend_beside(ax)
     return figure
 

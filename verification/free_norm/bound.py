@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -98,6 +98,13 @@ class FreeNormBound(Bound):
             why="" if detail.factor is not None else detail.why,
             detail=detail,
         )
+
+    def curve(self, subject: Subject, thetas: Sequence[float]) -> list[float | None]:
+        from verification.free_norm.norm import FreeNorm
+
+        free = FreeNorm(*pair_of(subject, "needed a pair of bodies"))
+        found = [free.factor(theta) for theta in thetas]
+        return [None if proof is None else proof.factor for proof in found]
 
     def enclose(
         self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress

@@ -27,6 +27,7 @@ from verification.output.files import (
     write_into,
 )
 from verification.problem.tables import ProblemError
+from verification.registry import BOUNDS
 from verification.spreadsheet import as_csv
 
 if TYPE_CHECKING:
@@ -180,6 +181,8 @@ def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None 
         drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.computed)
     if comparison is not None and comparison.losses is not None:
         drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
+    if comparison is not None and any(BOUNDS[bound.name].on_request for bound in comparison.computed):
+        drawn["factor"] = figures.draw_proved(comparison)
     _save(room, drawn)
     return list(drawn)
 

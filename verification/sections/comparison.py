@@ -40,6 +40,8 @@ WATERFALL = (
 )
 
 
+FACTOR = (("factor", "The factor of one step over theta by each bound, and the rate of the run."),)
+
 #: The verdicts as they are read; a bound has no conclusion where its hypotheses are not met.
 WORDS: Mapping[RunVerdict, str] = {
     "CONSISTENT": "consistent",
@@ -125,7 +127,7 @@ class Parts(Listener):
         title = "WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?"
         caption = "The same for the bound that takes the matrices of the bodies."
         if parts:
-            self.show((section("programs", title, *parts, caption=caption),))
+            self.show((section("programs", title, *parts, caption=caption, pictures=FACTOR),))
 
 
 def verdicts(result: Comparison) -> Sections:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ndtheory.constants import relaxation_factor
@@ -86,6 +87,12 @@ class SemidefiniteBound(Bound):
             not_computed=found.gave_up if factor is None else "",
             detail=found,
         )
+
+    def curve(self, subject: Subject, thetas: Sequence[float]) -> list[float | None]:
+        from verification.semidefinite.multipliers import QuadraticForms
+
+        forms = QuadraticForms(*pair_of(subject, "needed a pair of bodies"))
+        return [forms.factor(theta).value for theta in thetas]
 
     def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
         found = None if result is None else result.detail
