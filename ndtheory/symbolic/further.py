@@ -684,3 +684,98 @@ check(
         "the share of q": lambda q: (-theta / (q + 1 - theta), theta / (q - 1 + theta), lambda s: s * q),
     },
 )
+
+# --- the same without a mesh: layers, rectangles, and the local law ---------------------------------------------------
+
+
+def _two_matrices(form: Any) -> list[Goal]:
+    """The circle by its ends, and the determinant of M(h) by those of M(x_1), M(x_2) and its middle coefficient."""
+    x1, x2, h = sp.symbols("x1 x2 h", real=True)
+    u, t, a, b_, o, d_, e_, f = sp.symbols("u t a1 b1 o1 a2 b2 o2", real=True)
+    on_circle = (x1 + x2) * h - x1 * x2  # |h|^2, for h its real part
+    share = (h - x1) / (x2 - x1)
+    mean = lambda one, other: (1 - u) * one + u * other
+    determinant = mean(a, d_) * mean(b_, e_) - mean(o, f) ** 2 - t**2 * u * (1 - u)
+    ends = (1 - u) ** 2 * (a * b_ - o**2) + u**2 * (d_ * e_ - f**2)
+    return [
+        equal(on_circle - h**2, (h - x1) * (x2 - h)),  # the square of the imaginary part of h
+        equal(on_circle - h**2, (x2 - x1) ** 2 * share * (1 - share)),
+        equal(determinant, ends + 2 * u * (1 - u) * form((a, b_, o), (d_, e_, f), t)),
+        equal((1 - u) ** 2 * p**2 + u**2 * q**2 - 2 * u * (1 - u) * p * q, ((1 - u) * p - u * q) ** 2),
+    ]
+
+
+def _middle(of_t: Any) -> Any:
+    """The coefficient of 2u(1-u), with a term of t."""
+    return lambda one, other, t: (one[0] * other[1] + other[0] * one[1] - of_t * t**2) / 2 - one[2] * other[2]
+
+
+check(
+    id="x-layers",
+    text="On the circle (Im h)^2 = (Re h - x_1)(x_2 - Re h), so that beside the diagonal M(h) has"
+    " +-i t sqrt(u(1-u)), u = (Re h - x_1)/(x_2 - x_1).  Its determinant is (1-u)^2 det M(x_1) + 2u(1-u) m +"
+    " u^2 det M(x_2), which at m = -sqrt(det M(x_1) det M(x_2)) is a square with a zero in between.",
+    goals=_two_matrices,
+    forms={"repaired": _middle(1)},
+    mutants={"without t": _middle(0), "twice t^2": _middle(2)},
+)
+
+
+def _squares(form: Any) -> list[Goal]:
+    """|h|^2/(Re h + nu) is monotone on the circle, with these ends; the square that bounds the unknown form E_n."""
+    x1, x2, h, nu, y_ = sp.symbols("x1 x2 h nu y", real=True)
+    r, i, e1, e2 = sp.symbols("r i e1 e2", real=True)  # h = r + i i, and an amplitude e1 + i e2 against a real y
+    quotient = ((x1 + x2) * h - x1 * x2) / (h + nu)
+    low, high = form(x1, x2, nu)
+    rest = (r + nu) * (e1**2 + e2**2) - 2 * y_ * (r * e1 - i * e2) + (r**2 + i**2) / (r + nu) * y_**2
+    return [
+        equal(sp.diff(quotient, h) * (h + nu) ** 2, (x1 + x2) * nu + x1 * x2),
+        equal(quotient.subs(h, x1), low),
+        equal(quotient.subs(h, x2), high),
+        equal(rest, (r + nu) * ((e1 - r * y_ / (r + nu)) ** 2 + (e2 + i * y_ / (r + nu)) ** 2)),
+    ]
+
+
+check(
+    id="x-rectangles",
+    text="On the circle |h|^2 = (x_1+x_2) Re h - x_1 x_2, and the derivative of |h|^2/(Re h + nu) has the sign of"
+    " (x_1+x_2) nu + x_1 x_2 everywhere: the quotient is largest at an end, x_1^2/(x_1+nu) or x_2^2/(x_2+nu).  The"
+    " square in the unknown part of the flexibility is completed for complex amplitudes.",
+    goals=_squares,
+    forms={"repaired": lambda x1, x2, nu: (x1**2 / (x1 + nu), x2**2 / (x2 + nu))},
+    mutants={
+        "ends without nu": lambda x1, x2, nu: (x1, x2),
+        "one end twice": lambda x1, x2, nu: (x2**2 / (x2 + nu),) * 2,
+    },
+)
+
+
+def _saw_tooth(form: Any) -> list[Goal]:
+    """The amplification of a saw-tooth of pressure: its image from below, its own norm from above."""
+    n, width, d, G, nu, zeta = sp.symbols("n h d G nu zeta", positive=True)
+    x = sp.Symbol("x", real=True)
+    j = sp.Symbol("m", integer=True, nonnegative=True)
+    wave = (2 * j + 1) * sp.pi / width
+    hat = 2 * sp.integrate((1 - x / width) * sp.cos(wave * x), (x, 0, width))
+    E = 2 * G / (1 - nu)  # E^*
+    odd = sp.Rational(7, 8) * zeta  # the sum of (2m+1)^-3
+    first = sp.pi**2 / (4 * width * odd)  # c_0 from the sum of c_m 4h/(pi^2 (2m+1)^2) = 1, c_m = c_0/(2m+1)
+    own = width / 2 * first**2 * 2 * width / (E * sp.pi) * odd  # for each node
+    image = theta**2 * k**2 * n * d / (G * width)
+    return [
+        equal(sp.simplify(hat), 4 * width / (sp.pi**2 * (2 * j + 1) ** 2)),
+        equal(own, sp.pi**3 / (14 * zeta * E)),
+        equal(image / (n * own), form(zeta) * theta**2 * k**2 * d / ((1 - nu) * width)),
+    ]
+
+
+check(
+    id="x-local-law",
+    text="The shear field (y/d, 0) has the energy G n h/d and the work theta k n, so the image has at least the square"
+    " theta^2 k^2 n d/(G h).  The saw-tooth has at most pi^3/(14 zeta(3) E*) for each node, by the pressure"
+    " sum c_0/(2m+1) cos((2m+1) pi x/h) in a half-plane.  With E*/G = 2/(1-nu) the quotient is 28 zeta(3)/pi^3 times"
+    " theta^2 k^2 d/((1-nu) h).",
+    goals=_saw_tooth,
+    forms={"repaired": lambda zeta: 28 * zeta / sp.pi**3},
+    mutants={"14 for 28": lambda zeta: 14 * zeta / sp.pi**3, "pi^2": lambda zeta: 28 * zeta / sp.pi**2},
+)
