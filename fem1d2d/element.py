@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.material import Material
-from fem1d2d.mesh import Cells, Floats, Mesh, MeshError, crossed, measures
+from fem1d2d.mesh import Cells, Floats, Ints, Mesh, MeshError, crossed, measures
 
 
 class Element(ABC):
@@ -106,6 +106,23 @@ def lacks(mesh: Cells, ability: str) -> str:
     element = element_of(mesh)
     has = element.vtk if ability == "vtk" else ability in element.supports
     return "" if has else f"no {ABILITIES[ability]} with {element.words}"
+
+
+def as_drawn(mesh: Mesh, values: Floats) -> tuple[Ints, list[tuple[str, Ints, Floats]]]:
+    """The nodes and cells of a mesh before quadrilaterals were split by both diagonals, for files of meshio.
+
+    Returns the nodes that are left, and for each kind of cell its name, the places of its corners among these nodes,
+    and the means of values on the cells, shape (c, ..), weighted by their sizes.
+    """
+    around, corners = mesh.quadrilaterals
+    kept = np.delete(np.arange(len(mesh.points)), mesh.centres)
+    number = np.full(len(mesh.points), -1)
+    number[kept] = np.arange(len(kept))
+    whole = np.delete(np.arange(len(mesh.cells)), around)
+    sizes = measures(mesh.points, mesh.cells)[around].reshape(*around.shape, *[1] * (values.ndim - 1))
+    means = (sizes * values[around]).sum(axis=1) / sizes.sum(axis=1)
+    blocks = [(element_of(mesh).vtk, number[mesh.cells[whole]], values[whole]), ("quad", number[corners], means)]
+    return kept, [block for block in blocks if len(block[1])]
 
 
 def gradients(mesh: Cells) -> NDArray[Any]:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from fem1d2d import MeshError, stresses, von_mises
-from fem1d2d.element import element_of, lacks
-from fem1d2d.mesh import Floats, measures
+from fem1d2d.element import as_drawn, lacks
+from fem1d2d.mesh import Floats
 from ndtheory import __version__
 from ndtheory.texts import printable
 from verification.algorithm.history import History
@@ -58,20 +58,10 @@ def _write(path: Path, body: Body, u: Floats, says: str) -> None:
     if why := lacks(mesh, "vtk"):
         raise MeshError(f"{body.name}: {why}")
     spatial = lambda vectors: np.pad(vectors, ((0, 0), (0, 3 - mesh.dimension)))
-    tensor, (around, corners) = stresses(mesh, body.material, u), mesh.quadrilaterals
-    kept = np.delete(np.arange(len(mesh.points)), mesh.centres)
-    number = np.full(len(mesh.points), -1)
-    number[kept] = np.arange(len(kept))
-    sizes = measures(mesh.points, mesh.cells)[around][..., None, None]
-    whole = np.delete(np.arange(len(mesh.cells)), around)
-    blocks = [
-        (element_of(mesh).vtk, mesh.cells[whole], tensor[whole]),
-        ("quad", corners, (sizes * tensor[around]).sum(axis=1) / sizes.sum(axis=1)),
-    ]
-    blocks = [block for block in blocks if len(block[1])]
+    kept, blocks = as_drawn(mesh, stresses(mesh, body.material, u))
     written = meshio.Mesh(
         spatial(mesh.points[kept]),
-        [(kind, number[cells]) for kind, cells, _ in blocks],
+        [(kind, cells) for kind, cells, _ in blocks],
         point_data={"displacement": spatial(u[kept])},
         cell_data={
             "stress": [stress[:, *SIX] for *_, stress in blocks],
