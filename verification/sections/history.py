@@ -105,12 +105,12 @@ def _promised(found: History) -> Iterable[Shown | str]:
     yield table(("bound", "factor", "increments"), rows)
     promised = [each.promise.steps for each in found.increments if each.promise is not None and each.promise.steps]
     if promised:
-        most, seen = max(promised), [each.iterations or 0 for each in found.increments]
+        seen = [each.iterations for each in found.increments]
         yield (
-            f"The size of each load increment bounds its steps in advance: at most {min(promised)} to {most}; the runs"
-            f" took {min(seen)} to {max(seen)}."
+            f"The size of each load increment bounds its steps in advance: at most {_range(promised)}; the runs took"
+            f" {_range(seen)}."
         )
     elif why := next((each.why_none for each in found.increments if each.why_none), ""):
         yield f"No number of steps is promised: {why}."
     if predicted := [each.predicted_steps for each in found.increments if each.predicted_steps is not None]:
-        yield f"The Jacobian at the end of each increment predicts {min(predicted)} to {max(predicted)} steps."
+        yield f"The Jacobian at the end of each increment predicts {_range(predicted)} steps."
