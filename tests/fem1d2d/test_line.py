@@ -83,6 +83,8 @@ def test_a_side_is_cut_at_its_corners_and_a_closed_one_far_from_given_points():
     assert line.points[0] == pytest.approx([-1, 0], abs=1e-12)
     assert (line.points[0] == line.points[-1]).all()
     assert len(line.nodes) == 25
+    [line] = Line.parts(circle, "circle", left=True, away=np.array([[3.0, 0.0], [-1.2, 0.5], [-1.2, -0.5]]))
+    assert line.points[0][0] > 0.5  # far from the nearest of them, not from the farthest
 
 
 def test_a_line_that_comes_back_to_a_node_ends_in_a_refusal():

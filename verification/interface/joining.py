@@ -158,9 +158,10 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
             raise refuse(f"body {i + 1} has no side {side!r}; its sides: {', '.join(mesh.sides)}")
         drawn.append(np.array(spec.face) if mesh is None else mesh.points[np.unique(mesh.sides[side])].astype(float))
     for i, (side, mesh, held, away) in enumerate(zip(sides, meshes, known, drawn[::-1], strict=True)):
-        if mesh is None or held is None:  # the body lies on either side of the line, to be seen from the other body
+        if mesh is None:  # the body lies on either side of the line, to be seen from the other body
             parts.append(Line.through(drawn[i], away=away) + Line.through(drawn[i][::-1], away=away))
         else:
+            assert held is not None
             parts.append(Line.parts(mesh, side, left=i == 1, mirrored=held.held, away=away))
     contact = problem.contact_body - 1
     height = min(float(np.ptp(mesh.points.astype(float), axis=0).min()) for mesh in meshes if mesh is not None)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mesh_writer import write_gmsh22
+from mesh_writer import write_curved, write_gmsh22
 
 import verification as vf
 from fem1d2d import rectangle
@@ -89,6 +89,8 @@ def test_a_wedge_that_ends_over_a_block_touches_beside_its_end_only():
     touching = np.flatnonzero(found.contact.pressure)
     assert found.contact.x[touching].min() > 0.8
     assert found.contact.x[touching].max() <= 1.0
+    assert found.checks.penetration_outside >= 0
+    assert found.plot().axes
 
 
 @pytest.mark.parametrize("law", ["local", "nonlocal"])
@@ -188,3 +190,14 @@ def test_a_file_with_an_obstacle_is_written_and_read_back_equal():
         problem = pressed(face)
         assert vf.Problem.from_dict(problem.to_dict()) == problem
         assert problem.digest != pressed({"line": [[0, 0], [1, 0]]}).digest
+
+
+def test_bodies_that_overlap_deeply_at_one_end_only_are_refused_with_that_place(tmp_path):
+    """The top of the lower one rises from 0.018 below the other to 0.018 in it, 6 % of the height."""
+    rising = lambda x: 0.018 * (x - 1)
+    lower = {"mesh": write_curved(tmp_path / "low.msh", np.linspace(0, 2, 21), lambda x: 0 * x - 0.3, rising)}
+    upper = {"shape": "rectangle", "x": [0, 2], "y": [0, "0.3"], "cells": [20, 3], "prescribed": {"top": [0, "-0.01"]}}
+    moduli = {"young": 1000, "poisson": "0.3"}
+    data = {"body1": lower | moduli | {"fixed": ["bottom"]}, "body2": upper | moduli, "contact": {"interval": [0, 2]}}
+    with pytest.raises(vf.ProblemError, match=r"the bodies lie in each other: at x = 2 body 1 ends at y = 0\.018"):
+        vf.solve(vf.Problem.from_dict(data))

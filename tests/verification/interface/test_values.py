@@ -9,8 +9,9 @@ from histories import pressed_and_sheared
 from problem_list import bars, blocks, changed
 
 import verification as vf
+from fem1d2d import place, stresses
 from verification.cli import main
-from verification.interface.values import values_on_sides
+from verification.interface.values import columns_of, values_on_sides
 
 #: A column on rollers, free on its right, whose top is pressed down: E, nu, by how much, and its height.
 E, NU, DOWN, HEIGHT = 50000.0, 0.3, 0.004, 0.8
@@ -153,6 +154,20 @@ def test_an_obstacle_has_no_points_and_no_forces():
     for key, value in (("points", {"a": [0, 0]}), ("point_load", [{"at": [0, 0], "force": [1, 0]}])):
         with pytest.raises(vf.ProblemError, match=rf"body1\.{key}.*: unknown (key|table)"):
             vf.Problem.from_dict({**changed(), "body1": {"shape": "rigid", key: value}})
+
+
+def test_stresses_at_a_point_are_those_of_its_cell_component_by_component():
+    data = changed(body2={"prescribed": {"top": ["0.006", "-0.015"]}, "points": {"a": ["0.62", "0.11"]}})
+    found = vf.solve(vf.Problem.from_dict(data))
+    body, [one] = found.bodies.body2, found.points
+    cell = place(body.mesh, np.array([0.62, 0.11])).cells
+    tensor = stresses(body.mesh, body.material, found.displacements[1])[cell].mean(axis=0)
+    assert [one.stress[of] for of in ("xx", "yy", "xy")] == pytest.approx([tensor[0, 0], tensor[1, 1], tensor[0, 1]])
+    assert abs(one.stress["xy"]) > 1
+    assert list(columns_of([one])) == ["body", "name", "x", "y", "ux", "uy", "sxx", "syy", "sxy", "mises"]
+    bar = vf.solve(vf.Problem.from_dict(changed(bars(), body1={"points": {"a": 0}})))
+    assert list(columns_of(bar.points)) == ["body", "name", "x", "ux", "sxx", "mises"]
+    assert columns_of(()) == {}
 
 
 def test_points_change_no_number_and_no_digest():
