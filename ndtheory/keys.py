@@ -28,7 +28,7 @@ from functools import cache
 from itertools import count
 from pathlib import Path
 from types import NoneType, SimpleNamespace, UnionType
-from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin, get_type_hints, overload
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
@@ -133,6 +133,10 @@ def _marked(function: F, one: Key) -> F:
     return function
 
 
+@overload
+def derived(says: str, of: Callable[[Any], Any], hint: type[T], **more: Any) -> T: ...
+@overload
+def derived(says: str, of: Callable[[Any], Any], hint: Any = str, **more: Any) -> Any: ...
 def derived(says: str, of: Callable[[Any], Any], hint: Any = str, **more: Any) -> Any:
     """A property of a type that only looks a value up in parts of a result, as a key; arguments as of :class:`Key`."""
     of.__annotations__["return"] = hint

@@ -131,17 +131,8 @@ class Increment(Value, Part):
         """Values at the points that the problem names, at its end."""
         return self.result.points
 
-    @property
-    @says()
-    def step(self) -> int:
-        """Number of its step, from 1."""
-        return self.moment.step
-
-    @property
-    @says()
-    def name(self) -> str:
-        """The name of the step."""
-        return self.moment.name
+    step = derived("number of its step, from 1", lambda increment: increment.moment.step, int)
+    name = derived("the name of the step", lambda increment: increment.moment.name)
 
     @property
     @says()

@@ -159,11 +159,7 @@ class Run(Document):
         """The relaxation factor; the step length of the triple momentum method."""
         return self.choice.theta
 
-    @property
-    @says()
-    def relaxation(self) -> str:
-        """The name of the rule."""
-        return self.rule.name
+    relaxation = derived("the name of the rule", lambda run: run.rule.name)
 
     @property
     @says(name="outside_theorem")
@@ -223,17 +219,8 @@ class Run(Document):
         """The last iterate."""
         return self.iterates[-1]
 
-    @property
-    @says()
-    def iterations(self) -> int:
-        """Relaxations (III) done until the last evaluation of T."""
-        return self.last.iteration
-
-    @property
-    @says()
-    def evaluations(self) -> int:
-        """Evaluations of T."""
-        return len(self.iterates)
+    iterations = derived("relaxations (III) done until the last evaluation of T", lambda run: run.last.iteration, int)
+    evaluations = derived("evaluations of T", lambda run: len(run.iterates), int)
 
     @cached_property
     def _at_the_end(self) -> ObservedRate | None:

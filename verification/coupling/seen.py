@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ndtheory.keys import Part, key
+from ndtheory.keys import Part, derived, key
 from ndtheory.keys import says as means
 from ndtheory.number import above, below
 from verification.coupling.kinds import CONTACT, Kind
@@ -305,15 +305,8 @@ class LogBound(Part):
     value: Fraction = key(type="number", unit="1", of=below)
     log: SeenLog
 
-    @property
-    @means("the log it comes from")
-    def file(self) -> str:
-        return self.log.file
-
-    @property
-    @means("that of this log", unit="1")
-    def theta(self) -> float:
-        return float(self.log.theta)
+    file = derived("the log it comes from", lambda bound: bound.log.file)
+    theta = derived("that of this log", lambda bound: float(bound.log.theta), float, unit="1")
 
     says: str = key("what this log shows")
     assumes: str = key("what must hold for the bound")

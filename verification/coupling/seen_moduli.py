@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 
 from ndtheory import Number
 from ndtheory.energy_norms import parallel_theta, predicted_rate, predicted_theta
-from ndtheory.keys import Part, key, says
+from ndtheory.keys import Part, derived, key, says
 from ndtheory.moduli import Moduli
 from ndtheory.number import above
 from verification.coupling.evidence import Evidence
@@ -46,15 +46,8 @@ class LowerBounds(Part):
     stick: Number = key(r"where a piece of $\Gamma_c$, or at such an end, may stick", type="Number", unit="1")
     slide: Number = key(r"the bound of $\rho_N$, for the case without friction", type="Number", unit="1")
 
-    @property
-    @says(**_EXCLUDED)
-    def theta_excluded_stick(self) -> float | None:
-        return excluded_from(self.stick)
-
-    @property
-    @says(**_EXCLUDED)
-    def theta_excluded_slide(self) -> float | None:
-        return excluded_from(self.slide)
+    theta_excluded_stick = derived(of=lambda bounds: excluded_from(bounds.stick), hint=float | None, **_EXCLUDED)
+    theta_excluded_slide = derived(of=lambda bounds: excluded_from(bounds.slide), hint=float | None, **_EXCLUDED)
 
 
 def excluded_from(bound: Number) -> float | None:
@@ -175,10 +168,7 @@ class ElasticBodies(Evidence):
     def poisson(self) -> list[Any]:
         return [written_number(body.poisson) for body in self.bodies]
 
-    @property
-    @says("`strain`, `stress` or `3d`")
-    def plane(self) -> str:
-        return self.bodies[0].plane
+    plane = derived("`strain`, `stress` or `3d`", lambda bodies: bodies.bodies[0].plane)
 
     def spectra(self) -> tuple[Role, ...]:
         """Bounds of rho from below in both roles."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from ndtheory import Number
-from ndtheory.keys import key, says
+from ndtheory.keys import derived, key
 from verification.coupling.evidence import Evidence
 from verification.coupling.kinds import CONTACT, Kind
 from verification.coupling.methods import MethodRow
@@ -90,15 +90,8 @@ class Vectors(Evidence, Value):
         of=lambda ritz: [{"real": float(v.real), "imaginary": float(v.imag)} for v in ritz],
     )
 
-    @property
-    @says("estimated errors of both ends", unit="1")
-    def error_low(self) -> float:
-        return self.spectrum.error_low
-
-    @property
-    @says("estimated errors of both ends", unit="1")
-    def error_high(self) -> float:
-        return self.spectrum.error_high
+    error_low = derived("estimated errors of both ends", lambda vectors: vectors.spectrum.error_low, float, unit="1")
+    error_high = derived("estimated errors of both ends", lambda vectors: vectors.spectrum.error_high, float, unit="1")
 
     symmetric: bool = key("whether the eigenvalues are real")
     changing: bool = key("whether nodes open or close between the iterates", name="contact_changes")

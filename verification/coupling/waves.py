@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from ndtheory import HypothesisError, Number
 from ndtheory.constants import take
-from ndtheory.keys import key, says
+from ndtheory.keys import derived, key
 from ndtheory.moduli import Wall, added_mass, conduction, cooled
 from verification.coupling.evidence import Evidence
 from verification.coupling.kinds import BodyNumber, Kind
@@ -60,10 +60,7 @@ class Waves(Evidence):
     counts: ClassVar[Mapping[str, tuple[int, ...]]]
     needed: ClassVar[tuple[tuple[str, str], ...]]
 
-    @property
-    @says("`heat` or `fluid`", name="kind")
-    def exchanged(self) -> str:
-        return self.subject
+    exchanged = derived("`heat` or `fluid`", lambda waves: waves.subject, name="kind")
 
     film: tuple[Fraction, ...] | None = _data("film coefficient of a fluid (body 1) at a wall (body 2)")
     conductivity: tuple[Fraction, ...] | None = _data("of plate 1 and of plate 2, the capacity per volume")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from ndtheory.keys import Part, key, says
+from ndtheory.keys import Part, derived, key, says
 from verification.algorithm.history import History
 from verification.algorithm.runs import Run, run
 from verification.bounds.bound import Bound, NotComputed, Region, Subject
@@ -92,10 +92,7 @@ class Film(Part):
     regions: dict[str, Region]
     why_no_region: str
 
-    @property
-    @says("1 or 2", unit="")
-    def neumann_body(self) -> int:
-        return self.pair.neumann_body
+    neumann_body = derived("1 or 2", lambda film: film.pair.neumann_body, int, unit="")
 
     @property
     @says("a run for each friction and theta; of a problem with steps a loading history for each friction")

@@ -13,7 +13,7 @@ import numpy as np
 
 from ndtheory import __version__
 from ndtheory.energy_norms import one_minus_square, predicted_factor, predicted_theta
-from ndtheory.keys import key, says
+from ndtheory.keys import derived, key, says
 from verification.algorithm.history import History, march
 from verification.algorithm.runs import run
 from verification.bounds.bound import Region
@@ -68,10 +68,7 @@ class Exploration(Document):
     why_one_role: str
     histories: tuple[History, ...] = ()
 
-    @property
-    @says("title of the problem")
-    def title(self) -> str:
-        return self.problem.title
+    title = derived("title of the problem", lambda page: page.problem.title)
 
     @property
     @says("`roles`: why the roles cannot be exchanged")

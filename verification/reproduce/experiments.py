@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from ndtheory.keys import Key, Part, key, says
+from ndtheory.keys import Key, Part, derived, key, says
 from verification.algorithm.monolithic import SolveError, solve
 from verification.document import Document
 from verification.interface.fields import ContactFields
@@ -87,15 +87,8 @@ class Result(Part):
     outcomes: tuple[Outcome, ...] = key("one for each reading", name="readings")
     rows: tuple[dict[str, Any], ...] = field(default=(), repr=False)
 
-    @property
-    @says("the claim of the paper about it", name="says")
-    def claim(self) -> str:
-        return CLAIMS[self.figure].says
-
-    @property
-    @says("when a reading reproduces it")
-    def criterion(self) -> str:
-        return CLAIMS[self.figure].criterion
+    claim = derived("the claim of the paper about it", lambda result: CLAIMS[result.figure].says, name="says")
+    criterion = derived("when a reading reproduces it", lambda result: CLAIMS[result.figure].criterion)
 
     @property
     @says("`reproduced`, `reproduced under an assumption`, `undecided` or `not reproduced`")

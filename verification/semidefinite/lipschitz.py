@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ndtheory import Number
-from ndtheory.keys import Part, key, says
+from ndtheory.keys import Part, derived, key, says
 from ndtheory.number import above, below
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import ForceNorm
@@ -332,11 +332,7 @@ class Semidefinite(Part):
         """A proved factor of one step in real arithmetic: the Lipschitz constant where it contracts."""
         return self.lipschitz if self.lipschitz.value < 1 else None
 
-    @property
-    @says()
-    def gap(self) -> float:
-        """``lipschitz / lower - 1``."""
-        return self.lipschitz.value / self.lower - 1
+    gap = derived("`lipschitz / lower - 1`", lambda bound: bound.lipschitz.value / bound.lower - 1, float)
 
     @property
     @says()
