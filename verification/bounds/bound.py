@@ -295,9 +295,7 @@ class Bound(ABC):
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
         """Trace where the bound proves contraction in the plane of theta and k: by its interval at each friction.
 
-        Raises
-        ------
-        NotComputed
+        NotComputed where that has no friction to vary.
         """
         found = self.evaluate(subject)
         if found.friction.some is None or found.friction.every is None:

@@ -164,11 +164,7 @@ class Confirmation:
     ) -> Fraction:
         """A factor of one step that is confirmed, larger than the one that the multipliers prove in doubles.
 
-        In a norm that :func:`written_norm` gives, (5.21) by default.
-
-        Raises
-        ------
-        NoCertificate
+        In a norm that :func:`written_norm` gives, (5.21) by default.  NoCertificate where none is.
         """
         if not factor < 1:
             raise NoCertificate(f"the factor of one program is {factor:.4g}, which does not contract")
@@ -181,11 +177,8 @@ class Confirmation:
         """Confirm that every theta up to one contracts in a norm, at the pair's friction or at k and below.
 
         With 1 as the factor the multiplied form is positive definite, so that the factor is below 1; smaller thetas
-        contract in the same norm, and the conditions of a larger friction hold at a smaller one.
-
-        Raises
-        ------
-        NoCertificate
+        contract in the same norm, and the conditions of a larger friction hold at a smaller one.  NoCertificate where
+        it is not confirmed.
         """
         claims = self._claims
         if k is not None:
@@ -199,11 +192,8 @@ class Confirmation:
         """A theta up to which every one contracts, a little below the one in doubles, from its multipliers over theta.
 
         Over theta the form with q = 1 is ``2 |g|^2 - 2 <g, p> - theta |p - g|^2`` minus the multiplied conditions: it
-        grows as theta falls, so that one certificate answers for all smaller ones.
-
-        Raises
-        ------
-        NoCertificate
+        grows as theta falls, so that one certificate answers for all smaller ones.  NoCertificate where none is
+        accepted.
         """
         for share in LESS:
             found = _decimal(theta * (1 - share), ROUND_DOWN)

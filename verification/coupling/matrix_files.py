@@ -44,11 +44,7 @@ def read_matrix(path: Path, name: str = "") -> Floats:
     ``.npy``; ``.npz`` (scipy.sparse.save_npz, or numpy.savez); ``.mtx`` (Matrix Market); ``.mat`` (MATLAB, not 7.3);
     ``.csv`` and ``.txt`` (rows of numbers, separated by commas, semicolons or blanks).  Shapes are read first: a small
     file may unpack to more than the memory holds.  Of several arrays it is the one called ``name``, also beside a
-    sparse matrix, as in P.npz of a run.
-
-    Raises
-    ------
-    ProblemError
+    sparse matrix, as in P.npz of a run.  ProblemError for a file that is none.
     """
     refuse = lambda needed: ProblemError(str(path), "", None, needed)
     read, written = _READERS.get(path.suffix.lower(), (None, ""))

@@ -198,9 +198,7 @@ def of_matrix(body: BodyNumber, S: Any, *, general: bool = False) -> Side:
 def rows_of(given: dict[BodyNumber, tuple[Any, Any]], unknowns: Any, transfer: Any) -> dict[int, int]:
     """Number of unknowns of each body on the interface, by the sizes of (S, solve) that were given.
 
-    Raises
-    ------
-    ValueError
+    ValueError where they do not tell it, or differ.
     """
     told: dict[int, set[int]] = {
         body: {int(thing.shape[0]) for thing in things if hasattr(thing, "shape") and len(thing.shape) == 2}

@@ -130,9 +130,7 @@ class Search:
     def energy_factor(self, theta: float, k: float) -> tuple[float, Multipliers, float]:
         """The least factor in the norm (5.21) by multipliers that all wave numbers share; these, and their weight.
 
-        Raises
-        ------
-        LMIError
+        LMIError where none prove anything.
         """
         move, pairs = self._energy_forms(theta, k)
         some = np.arange(len(move)) % FEWER == 0

@@ -123,9 +123,7 @@ class QuadraticForms(Conditions):
     def factor(self, theta: float) -> Certified:
         """The least Lipschitz constant of T_theta in the norm (5.21) that multipliers prove, for 0 < theta <= 1.
 
-        Raises
-        ------
-        LMIError
+        LMIError where none do.
         """
         return self.on(self.everywhere, theta)[0]
 
@@ -141,11 +139,8 @@ class QuadraticForms(Conditions):
         """The same for some of the affine pieces of T, with the solver's proposal; None where it gave up.
 
         ``stop`` is for the program, whose s is the square of the constant.  ``parent`` is a set of which these are the
-        pieces with more signs fixed, and its proposal: a start that saves half of the steps on Section 6.
-
-        Raises
-        ------
-        LMIError
+        pieces with more signs fixed, and its proposal: a start that saves half of the steps on Section 6.  LMIError
+        where no multipliers prove anything.
         """
         fixed, start = self.fixed(theta), None
         if parent is not None and parent[1].early is not None:
@@ -170,11 +165,7 @@ class QuadraticForms(Conditions):
     def friction_number(self, near: Start | None = None) -> Certified:
         """The least c with ``<g, p> <= c |g|^2`` that multipliers prove: every small theta contracts where c < 1.
 
-        ``near`` is from the friction number at a friction nearby.
-
-        Raises
-        ------
-        LMIError
+        ``near`` is from the friction number at a friction nearby.  LMIError where none do.
         """
         holds = lambda weights: self.traces.with_multipliers(weights, cross=1.0)
         fixed, start = -self.cross, None
@@ -200,13 +191,10 @@ class QuadraticForms(Conditions):
     def largest_theta(self, near: Start | None = None) -> Certified | None:
         """The largest theta <= 1 below which multipliers prove that every T_theta contracts; None where there is none.
 
-        With q = 1 the form, over theta, is linear in theta and the multipliers: one program answers for all theta.
-        The program of the friction number says whether there is any, and starts it, unless ``near`` does: from the
-        largest theta at a larger friction, whose multipliers prove as much here.
-
-        Raises
-        ------
-        LMIError
+        With q = 1 the form, over theta, is linear in theta and the multipliers: one program answers for all theta. The
+        program of the friction number says whether there is any, and starts it, unless ``near`` does: from the largest
+        theta at a larger friction, whose multipliers prove as much here.  LMIError where the solver ends without an
+        answer.
         """
         move = self.p - self.g
         still, moving = 2 * (self.free - self.cross), self.inner(move, move)
@@ -310,9 +298,7 @@ class QuadraticForms(Conditions):
     ) -> Optimum:
         """The solver's proposal, from a start that is near its end, else from known multipliers.
 
-        Raises
-        ------
-        LMIError
+        LMIError where it gives up.
         """
         if start is not None:
             try:
@@ -341,9 +327,7 @@ class QuadraticForms(Conditions):
     def _program(self, fixed: Floats, known: Weights, theta: float, pieces: Pieces) -> Program:
         """The program of the least s; it starts from known multipliers that are moved inside the cone.
 
-        Raises
-        ------
-        LMIError
+        LMIError where none are inside.
         """
         start = [2 * m + theta / 10 * more for m, more in zip(known, self.towards_zero, strict=True)]
         for stretch in STRETCHES if len(start) > 1 else STRETCHES[:1]:
@@ -383,11 +367,8 @@ def _least_share(holds: Callable[[float], bool]) -> float | None:
 def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, progress: Progress = silent) -> float:
     """The friction below which every small theta is certified to contract: a bound from below, close to ``NARROW``.
 
-    ``start`` is the threshold of the theorem in energy norms, which is below it.
-
-    Raises
-    ------
-    LMIError
+    ``start`` is the threshold of the theorem in energy norms, which is below it.  LMIError where it would be below
+    LEAST of that.
     """
 
     near: Start | None = None
