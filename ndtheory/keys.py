@@ -239,14 +239,9 @@ def plain(value: Any) -> Any:
 class Row:
     """A row of a table: keys that share a type and a meaning.
 
-    Attributes
-    ----------
-    keys : tuple of str
-        Paths with dots, in which ``*`` stands for any name; or one that names an included part.
-    type, unit, says : str
-        Type, unit and meaning; empty where there is none.
-    null, absent : str or None
-        When the value is null, and when the key is left out; None for never.
+    ``keys`` are paths with dots, in which ``*`` stands for any name, or one that names an included part.  ``type``,
+    ``unit`` and ``says``, its meaning, are empty where there is none; ``null`` and ``absent`` say when the value is
+    null, and when the key is left out, None for never.
     """
 
     keys: tuple[str, ...]

@@ -85,12 +85,8 @@ class Moduli:
 class HalfPlanes:
     """Ratios of stiffnesses of two half-planes, contact body over Neumann body, exact.
 
-    Attributes
-    ----------
-    high, low : Fraction
-        ``(G_c/G_n) kappa_n`` and ``(G_c/G_n)/kappa_c``: of a patch that sticks.
-    free : Fraction
-        ``E*_c/E*_n``: of a patch that slides freely.
+    ``high`` and ``low`` are ``(G_c/G_n) kappa_n`` and ``(G_c/G_n)/kappa_c``, of a patch that sticks; ``free`` is
+    ``E*_c/E*_n``, of one that slides freely.
     """
 
     high: Fraction

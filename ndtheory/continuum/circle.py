@@ -74,12 +74,7 @@ Enclosed = tuple[Symmetric, Symmetric, Multipliers, Interval]
 class Pencil:
     """The form M on a circle: ``(1 - u) low + u high + i turn sqrt(u (1 - u)) J``, 0 <= u <= 1, J' = -J.
 
-    Attributes
-    ----------
-    low, high : Symmetric
-        M at both ends of the disk.
-    turn : Scalar
-        Of any sign.
+    ``low`` and ``high`` are M at both ends of the disk; ``turn`` has any sign.
     """
 
     low: Symmetric
@@ -134,12 +129,7 @@ def pencil(
 class TwoLayers:
     """Two layers that touch along any part of a line, with the hat kernel of a radius r > 0.
 
-    Attributes
-    ----------
-    contact, neumann : Strip
-        The layer of step II, and the one of step I.
-    radius : Fraction
-        Unit length.
+    ``contact`` is the layer of step II, ``neumann`` the one of step I; ``radius`` is a length.
     """
 
     contact: Strip

@@ -43,14 +43,9 @@ class RectangleMultipliers(Multipliers):
 class RectangleCircle:
     """The criterion for two rectangles.
 
-    Attributes
-    ----------
-    layers : TwoLayers
-        The layers that contain them, and the radius of the kernel.
-    C_t1_square, C_t2_square : Fraction
-        Upper bounds for the contact body and the Neumann body, unit length/stress.
-    cut_off : Fraction or None
-        eps, at most; None where Gamma_c reaches a side of the Neumann body.
+    ``layers`` contain them, and have the radius of the kernel.  ``C_t1_square`` and ``C_t2_square`` are upper bounds
+    for the contact body and the Neumann body, unit length/stress.  ``cut_off`` is eps, at most; None where Gamma_c
+    reaches a side of the Neumann body.
 
     Examples
     --------

@@ -42,14 +42,8 @@ FOUR_OVER_PI_SQUARE = Fraction(40529, 100000)
 class Rectangle:
     """A body whose side opposite Gamma_c is clamped, and no other side held; HypothesisError for other values.
 
-    Attributes
-    ----------
-    left, right : Fraction
-        Its ends along Gamma_c, left < right, unit length.
-    thickness : Fraction
-        d > 0, from Gamma_c to the clamped side.
-    body : Moduli
-        Not incompressible, kappa > 1.
+    ``left`` < ``right`` are its ends along Gamma_c, ``thickness`` is d > 0, from Gamma_c to the clamped side, lengths;
+    ``body`` is not incompressible, kappa > 1.
     """
 
     left: Fraction
@@ -80,14 +74,8 @@ class Rectangle:
 class TwoRectangles:
     """Two rectangles in contact; HypothesisError for other values.
 
-    Attributes
-    ----------
-    contact, neumann : Rectangle
-        The body of step II, and the one of step I.
-    interval : tuple of Fraction
-        Ends of Gamma_c, inside both.
-    radius : Fraction
-        r > 0 of the hat kernel.
+    ``contact`` is the body of step II, ``neumann`` the one of step I; ``interval`` has the ends of Gamma_c, inside
+    both, and ``radius`` is r > 0 of the hat kernel.
 
     Examples
     --------

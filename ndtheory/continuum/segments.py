@@ -33,12 +33,8 @@ FREE = Fraction(1)
 class Zone:
     """A part of Gamma_c and the slopes of its two segments, lengths in thicknesses.
 
-    Attributes
-    ----------
-    lo, hi : Fraction
-        Distances from the left side of the body.
-    left, right : Fraction
-        Slopes, left < right.
+    It is from ``lo`` to ``hi``, distances from the left side of the body; ``left`` and ``right`` are the slopes, left <
+    right.
     """
 
     lo: Scalar
@@ -175,11 +171,7 @@ def bound_at_end(room: Fraction, kappa: Fraction) -> Fraction:
     Two families of parallel segments: every point has the same sum, so that the bound also holds for any part of a body
     below a line parallel to Gamma_c, with the distance of that line from the clamped side in place of d.
 
-    Parameters
-    ----------
-    room : Fraction
-        Largest reach of segments into the body, in thicknesses, > 0.
-    kappa : Fraction
+    ``room`` > 0 is the largest reach of segments into the body, in thicknesses.
 
     Examples
     --------

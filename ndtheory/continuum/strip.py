@@ -64,12 +64,7 @@ def symbols(
 class Strip:
     """A strip clamped on one side.
 
-    Attributes
-    ----------
-    body : Moduli
-        With kappa > 1: not incompressible.
-    thickness : Fraction
-        d > 0, unit length.
+    ``body`` is not incompressible, kappa > 1; ``thickness`` is d > 0, a length.
     """
 
     body: Moduli

@@ -38,14 +38,8 @@ STEP, HALVINGS = 1.4, 10
 class Wedge:
     """A body near an end of Gamma_c; HypothesisError for other values.
 
-    Attributes
-    ----------
-    body : Moduli
-        Of the plane, with kappa > 1: not incompressible.
-    degrees : Fraction
-        Its opening there, 0 < degrees < 360; 180 where the surface goes on.
-    clamped : bool
-        True if the side beyond Gamma_c is clamped; it is free otherwise.
+    ``body`` is of the plane and not incompressible, kappa > 1; ``degrees``, 0 < degrees < 360, is its opening there,
+    180 where the surface goes on; the side beyond Gamma_c is ``clamped``, or free.
     """
 
     body: Moduli
@@ -137,12 +131,8 @@ def ratio(contact: Wedge, neumann: Wedge, xi: Numeric, *, normal: bool = False) 
 class EndBound:
     """A lower bound of rho from one end of Gamma_c.
 
-    Attributes
-    ----------
-    least : Fraction
-        rho is proved to be at least this.
-    xi : Fraction or None
-        Where the symbols give it; None in the limit of large xi, where both bodies are like half-planes.
+    rho is proved to be at least ``least``, which the symbols give at ``xi``; None in the limit of large xi, where both
+    bodies are like half-planes.
     """
 
     least: Fraction

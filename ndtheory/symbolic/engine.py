@@ -58,12 +58,8 @@ class Relation:
 class Decision:
     """The result of :func:`decide`.
 
-    Attributes
-    ----------
-    holds : bool or None
-        None where neither a proof nor a counterexample was found.
-    counterexample : mapping
-        Symbol -> exact value, where a relation fails.
+    ``holds`` is None where neither a proof nor a counterexample was found; ``counterexample`` has the exact value of
+    each symbol where a relation fails.
     """
 
     holds: bool | None
@@ -74,14 +70,9 @@ class Decision:
 class Goal:
     """A relation with the charts that reach every admissible value of its symbols.
 
-    Attributes
-    ----------
-    relation : Relation
-    charts : sequence of mapping
-        Symbol -> expression in free parameters; one empty chart where the symbols are free already.
-    squares : sequence of expressions
-        Subtracted from the difference before its coefficients are read; each is visibly non-negative (coefficients >= 0
-        times squares).
+    ``charts`` give symbols as expressions in free parameters; one is empty where the symbols are free already.
+    ``squares`` are subtracted from the difference before its coefficients are read; each is visibly non-negative
+    (coefficients >= 0 times squares).
     """
 
     relation: Relation

@@ -23,11 +23,7 @@ class NotRational(ValueError):
 class Quotient:
     """``polynomial`` times the product of base^power.
 
-    Attributes
-    ----------
-    polynomial : PolyElement
-    powers : dict
-        Base -> power, an integer other than 0; below the line where it is negative.
+    ``powers`` has the power of each base, an integer other than 0; below the line where it is negative.
     """
 
     polynomial: PolyElement

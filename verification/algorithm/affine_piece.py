@@ -27,14 +27,9 @@ class Changes:
     First every contact node keeps touching or stays open; then, in this order, slipping nodes keep their direction,
     sticking nodes stay below their bound on either side, and S sigma_N keeps its sign.
 
-    Attributes
-    ----------
-    speed : array
-        Largest change of a condition for a change of g of size 1 in the norm (5.21).
-    nodes : int array
-        The contact node of each condition.
-    slips, sticks, rubs : int array
-        Contact nodes that slip, that stick, and both, where friction can act.
+    ``speed`` is the largest change of each condition for a change of g of size 1 in the norm (5.21), ``nodes`` its
+    contact node; ``slips``, ``sticks`` and ``rubs`` are the contact nodes that slip, that stick, and both, where
+    friction can act.
     """
 
     speed: Floats
@@ -48,14 +43,8 @@ class Changes:
 class Piece(Value):
     """An affine piece of T.
 
-    Attributes
-    ----------
-    pattern : Pattern
-        The state of each contact node.
-    sign : int array, shape (t,)
-        Signs of S sigma_N at the nodes; 0 where the friction bound is 0.
-    still : bool array, shape (n,)
-        Open nodes whose g_N is 0 and stays so; see ``basis``.
+    ``pattern`` has the state of each contact node; ``sign``, shape (t,), the signs of S sigma_N, 0 where the friction
+    bound is 0; ``still``, shape (n,), is True at open nodes whose g_N is 0 and stays so, see ``basis``.
     """
 
     pair: ContactPair

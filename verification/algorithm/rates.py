@@ -68,14 +68,9 @@ def noises(pair: ContactPair, iterates: Sequence[Iterate]) -> list[float]:
 class ObservedRate:
     """The rate at the end of a run.
 
-    Attributes
-    ----------
-    value : float
-        Geometric mean of the last quarter of the step ratios since the contact pattern last changed.
-    lo, hi : float
-        Hull of the rates over that quarter and over the one before it, widened by the noise.
-    begin, end : int
-        The iterates whose residuals it compares.
+    ``value`` is the geometric mean of the last quarter of the step ratios since the contact pattern last changed, from
+    ``lo`` to ``hi`` the hull of the rates over that quarter and over the one before it, widened by the noise; ``begin``
+    and ``end`` are the iterates whose residuals it compares.
     """
 
     value: float
@@ -116,12 +111,8 @@ def settled(patterns: Sequence[object]) -> int:
 def rate_at_the_end(residuals: Sequence[float], floors: Sequence[float], since: int) -> ObservedRate:
     """Return the rate over the last quarter of the steps since the contact pattern settled.
 
-    Parameters
-    ----------
-    residuals, floors : sequence of float
-        At least three residuals and the noise of each.
-    since : int
-        The first iterate with the final pattern.
+    ``residuals`` are at least three, with their noise as ``floors``; ``since`` is the first iterate with the final
+    pattern.
     """
     end = len(residuals) - 1
     begin = min(since, end - 2)

@@ -51,12 +51,8 @@ VectorStep = Callable[[Floats, Floats], Floats]
 class Metric:
     """The inner product by which a rule measures vectors: ``<a, b> = coordinates(a)' coordinates(b)``.
 
-    Attributes
-    ----------
-    inner : callable
-        From two vectors to their inner product.
-    coordinates : callable
-        From a vector, or columns of vectors, to their coordinates in an orthonormal basis.
+    ``inner`` takes two vectors to their inner product, ``coordinates`` a vector, or columns of vectors, to coordinates
+    in an orthonormal basis.
     """
 
     inner: Callable[[Floats, Floats], float]

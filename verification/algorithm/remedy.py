@@ -74,12 +74,8 @@ def remedy_of(
 ) -> Remedy:
     """Return the change to try after a run that did not converge, from its end.
 
-    Parameters
-    ----------
-    pair, rule, theta
-        Those of the run.
-    outcome, last, rate, coupled
-        Its outcome, last iterate, observed rate and coupled residual.
+    ``pair``, ``rule`` and ``theta`` are the run's, the others its outcome, last iterate, observed rate and
+    coupled residual.
     """
     tolerance, most, reached = pair.settings.tolerance, pair.settings.max_iterations, last.relative_residual
     constant = not rule.takes_theta

@@ -35,15 +35,9 @@ ROUNDING = 1e-15
 class Start(Value):
     """g_0 of a run and where it comes from.
 
-    Attributes
-    ----------
-    g : array
-        Nodal forces on the Neumann grid, tangential components first.
-    source : {'zero', 'given', 'tied'}
-    why : str
-        Why the run does not start from g = 0; empty where it does.
-    scale : float
-        Least size with which the residual is compared, in the norm (5.21): 0, or from :func:`least_scale`.
+    ``g`` are nodal forces on the Neumann grid, tangential components first; ``why`` says why the run does not start
+    from g = 0, empty where it does; ``scale`` is the least size with which the residual is compared, in the norm
+    (5.21): 0, or from :func:`least_scale`.
     """
 
     g: Floats

@@ -38,12 +38,8 @@ class NotExact(ValueError):
 class ExactBody:
     """A body whose stiffness and Gram matrices, on its unknowns, are known up to a radius.
 
-    Attributes
-    ----------
-    body : Body
-        The same in doubles: its unknowns, its interface and its order of elimination.
-    x : array of Fraction, shape (contact nodes,)
-        Positions of the contact nodes.
+    ``body`` is the same in doubles, with its unknowns, its interface and its order of elimination; ``x`` are the
+    positions of the contact nodes.
     """
 
     body: Body

@@ -28,11 +28,8 @@ KEPT = 4_000_000
 class Pattern(Value):
     """Contact state of each node.
 
-    Attributes
-    ----------
-    touching : bool array, shape (n,)
-    sliding : int array, shape (t,)
-        0 where the node sticks, else the sign of its slip and of its friction force.
+    ``touching`` has the shape (n,); ``sliding``, shape (t,), is 0 where the node sticks, else the sign of its slip and
+    of its friction force.
     """
 
     touching: NDArray[np.bool_]
@@ -109,17 +106,9 @@ class Systems:
 class ActiveSet:
     """The solver for one stiffness matrix.
 
-    Parameters
-    ----------
-    S : array, shape (t + n, t + n)
-        Symmetric, positive definite on the free components orthogonal to the motions.
-    free : bool array, shape (t + n,)
-    tangential : int
-        t.
-    motions : array, shape (t + n, k), optional
-        The kernel of S, where only contact holds the body.
-    systems : Systems, optional
-        Of the same matrix, to be shared by solvers that run one after the other.
+    ``S``, shape (t + n, t + n), is symmetric, positive definite on the ``free`` components orthogonal to the
+    ``motions``, shape (t + n, k), its kernel where only contact holds the body; ``tangential`` is t.  ``systems`` of
+    the same matrix are shared by solvers that run one after the other.
     """
 
     def __init__(

@@ -20,14 +20,9 @@ class KKT:
 
     Forces are relative to the largest force, lengths to that force over the stiffness.
 
-    Attributes
-    ----------
-    equilibrium : float
-        ``S v + force = q``.
-    non_penetration, compression, complementarity : float
-        ``v_N <= 0``, ``force_N >= 0``, ``force_N v_N = 0`` (2.4).
-    bound, slip : float
-        ``|force_T| <= bound`` and ``force_T v_T = bound |v_T|`` (2.6).
+    ``equilibrium`` is ``S v + force = q``; ``non_penetration``, ``compression`` and ``complementarity`` are ``v_N <=
+    0``, ``force_N >= 0``, ``force_N v_N = 0`` (2.4); ``bound`` and ``slip`` are ``|force_T| <= bound`` and ``force_T
+    v_T = bound |v_T|`` (2.6).
     """
 
     equilibrium: float
@@ -49,12 +44,8 @@ class KKTCertificate:
 
     A complementarity pair is measured by the smaller of its two relative terms, the distance to the nearer branch.
 
-    Parameters
-    ----------
-    S : array, shape (t + n, t + n)
-        Stiffness, symmetric; t tangential components (0 in 1D) and then n normal ones.
-    free : bool array, shape (t + n,), optional
-        Unknown components; equilibrium is checked only on these.
+    ``S``, shape (t + n, t + n), is symmetric, t tangential components (0 in 1D) and then n normal ones; equilibrium is
+    checked only on the ``free`` components.
     """
 
     def __init__(self, S: Floats, free: NDArray[np.bool_] | None = None) -> None:

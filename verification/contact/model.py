@@ -23,15 +23,9 @@ class ContactModel:
 
     Everything is scaled by the stiffness so that the solver sees numbers near one in any unit.
 
-    Parameters
-    ----------
-    S : array, shape (t + n, t + n)
-    free : bool array, shape (t + n,)
-        Held components are not variables: their v is a datum.
-    tangential : int
-        t.
-    motions : int
-        Number of rigid motions that only contact holds: the dimension of the kernel of S.
+    ``S`` has the shape (t + n, t + n), and ``tangential`` is t.  Components that are not ``free`` are not variables:
+    their v is a datum.  ``motions`` is the number of rigid motions that only contact holds, the dimension of the kernel
+    of S.
     """
 
     def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, motions: int = 0) -> None:

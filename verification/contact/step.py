@@ -40,14 +40,8 @@ class NoMinimiser(ContactError):
 class ContactSolution(Value):
     """A solution of step II with its KKT residuals, which are below the tolerance except those of :class:`ProgramStep`.
 
-    Attributes
-    ----------
-    v : array, shape (t + n,)
-        Tangential slip and normal penetration (<= 0: minus the gap), unit of length.
-    force : array, shape (t + n,)
-        Nodal forces on the other body.
-    solver : {'cvxpy', 'active-set'}
-        Which of them found the active set.
+    ``v``, shape (t + n,), is the tangential slip and the normal penetration (<= 0: minus the gap), unit of length;
+    ``force``, of the same shape, are nodal forces on the other body; ``solver`` found the active set.
     """
 
     v: Floats

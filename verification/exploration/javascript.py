@@ -12,12 +12,7 @@ from typing import Any
 class Scalar:
     """A number that writes down the operations made with it; equal ones are written once.
 
-    Parameters
-    ----------
-    text : str
-        Its name in JavaScript.
-    known : dict
-        The constants defined so far: expression -> name.
+    ``text`` is its name in JavaScript, ``known`` has the names of the constants defined so far by their expressions.
     """
 
     def __init__(self, text: str, known: dict[str, str]) -> None:

@@ -61,12 +61,8 @@ Complex = Any  # an array of complex numbers
 class Circle:
     """A circle on which M is positive definite, with multipliers in the order of a program.
 
-    Attributes
-    ----------
-    margin : float
-        The least eigenvalue of M, by the points looked at; lambda is at most 1.
-    largest : float
-        The largest ``|h|``.
+    ``margin`` is the least eigenvalue of M, by the points looked at, where lambda is at most 1; ``largest`` is the
+    largest ``|h|``.
     """
 
     margin: float

@@ -40,14 +40,9 @@ TRIED = 8
 class FoundRadius:
     """Pieces of T_theta and the spectral radius of the product of their Jacobians.
 
-    Attributes
-    ----------
-    value : float
-        ``radius(J_m .. J_1)^(1/m)``, in doubles: no norm in which T_theta contracts under all loads has less.
-    pieces : tuple of Piece
-        In the order of the steps, m of them.
-    evaluations : int
-        Spectral radii that the search had evaluated by then.
+    ``value`` is ``radius(J_m .. J_1)^(1/m)``, in doubles: no norm in which T_theta contracts under all loads has less.
+    ``pieces`` are in the order of the steps, m of them; ``evaluations`` counts the spectral radii that the search had
+    evaluated by then.
     """
 
     value: float
@@ -124,12 +119,8 @@ def largest_radius(pair: ContactPair, theta: float, *, evaluations: int = EVALUA
     The starts are: all nodes stick that can; all are open but one, and slide one way; the pieces to which climbs of
     ``|J|`` lead; and random patterns, always the same.  A larger radius may exist.
 
-    Parameters
-    ----------
-    evaluations : int
-        Spectral radii at most: for one piece, and again for several.
-    length : int
-        Number m of pieces.
+    At most so many ``evaluations`` of spectral radii are made for one piece, and again for several, which are
+    ``length``.
 
     Examples
     --------

@@ -120,15 +120,8 @@ def rectangle_norm(
 ) -> RectangleNorm:
     """Prove contraction of two rectangles by the circle criterion, from bounds of their constants.
 
-    Parameters
-    ----------
-    model : TwoRectangles
-    constants : ContinuumConstants
-        Its bounds.
-    friction : Fraction
-        An upper bound of k >= 0.  Without friction nothing is gained, and all numbers are None.
-    theta : Fraction or None
-        Where a factor is wanted.
+    ``constants`` are bounds for the ``model``, ``friction`` an upper bound of k >= 0, without which nothing is
+    gained, and all numbers are None; ``theta`` is where a factor is wanted.
     """
     names = ("friction_threshold", *AT_FRICTION)
     if not friction:

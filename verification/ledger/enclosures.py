@@ -304,16 +304,8 @@ Key = tuple[str, Aspect]
 class EnclosedConstants(RightSides):
     """The constants as Section 5 reads them, and its right sides, all enclosed.
 
-    Attributes
-    ----------
-    printed : bool
-        True if the bracket of (5.30) adds a stress to 1.
-    unit : Fraction
-        The unit of stress in units of the file.
-    share : Fraction
-        The friction over the friction of the bodies.
-    half : bool
-        True if C_K has C_tr into H^1/2.
+    The bracket of (5.30) adds a stress to 1 if ``printed``; ``unit`` is the unit of stress in units of the file,
+    ``share`` the factor of the bodies' friction; C_K has C_tr into H^1/2 if ``half``.
     """
 
     bodies: EnclosedBodies

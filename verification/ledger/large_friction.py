@@ -41,12 +41,8 @@ STEP = 1e-4
 class Witness:
     """Two forces that violate the printed inequality, for loads made for them.
 
-    Attributes
-    ----------
-    name : str
-        The name of the problem.
-    reading : Reading
-        The constants, as repaired, in the chosen unit: all stresses are multiplied by ``unit``.
+    ``name`` names the problem; ``reading`` has the constants, as repaired, in the chosen unit: all stresses are
+    multiplied by ``unit``.
     """
 
     name: str

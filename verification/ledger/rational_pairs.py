@@ -67,12 +67,8 @@ def solved(A: Exact, B: Exact) -> Exact:
 class ExactSide:
     """A body, condensed to its contact nodes in rationals; ``side`` is the same in doubles.
 
-    Attributes
-    ----------
-    S : array of Fraction
-        What elimination leaves of the stiffness matrix on Gamma_c.
-    energy : array of Fraction
-        ``a(R phi, R chi)`` of the lifted fields: the same matrix by another way.
+    ``S`` is what elimination leaves of the stiffness matrix on Gamma_c, ``energy`` the form ``a(R phi, R chi)`` of the
+    lifted fields: the same matrix by another way.
     """
 
     def __init__(self, problem: Problem, side: Condensed) -> None:

@@ -79,12 +79,8 @@ class Search:
 
     The loads of ``pair`` do not matter, as each piece occurs for suitable ones.
 
-    Parameters
-    ----------
-    factors : callable
-        Of the form (:data:`verification.semidefinite.neighbours.Factors`).
-    against : array, optional
-        The form whose value is 1, in y with ``g = L y``: the identity, the norm (5.21), by default.
+    ``factors`` are of the form (:data:`verification.semidefinite.neighbours.Factors`); ``against`` is the form whose
+    value is 1, in y with ``g = L y``: the identity, the norm (5.21), by default.
     """
 
     def __init__(self, pair: ContactPair, factors: Factors, *, against: Floats | None = None) -> None:

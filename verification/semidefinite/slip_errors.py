@@ -43,13 +43,8 @@ STATES = np.array([[a, b] for a in (0, 1) for b in (-1, 0, 1)], dtype=np.int8)
 class GrowingPair:
     """Two slips at the start of an increment, and the growth of their distance.
 
-    Attributes
-    ----------
-    factor : float
-        ``|t - t~|_K / |s - s~|_K`` for the slips t at the end.
-    jump : array, shape (2 n,)
-        The jump that the loads cause without contact forces, less the gap.
-    slips : pair of arrays, shape (n,)
+    ``factor`` is ``|t - t~|_K / |s - s~|_K`` for the slips t at the end, ``jump``, shape (2 n,), the jump that the
+    loads cause without contact forces, less the gap; ``slips`` have the shape (n,).
     """
 
     factor: float

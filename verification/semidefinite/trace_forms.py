@@ -51,12 +51,9 @@ class TraceForms:
     Without friction p has no tangential part: c is then the normal part of a trace and P has S_1 with the tangential
     components condensed out.
 
-    Parameters
-    ----------
-    S_1, carries : array of shape (m, m), slice
-        From c to the components of p that are not 0, and these components.
-    near : arrays of shape (N, N) and (m, m)
-        Changes of d and of c, as columns, in which the forms are of size 1: the nearer, the less is lost to rounding.
+    ``S_1``, shape (m, m), leads from c to the components of p that are not 0, which ``carries`` selects.  ``near``,
+    shapes (N, N) and (m, m), are changes of d and of c, as columns, in which the forms are of size 1: the nearer, the
+    less is lost to rounding.
     """
 
     def __init__(

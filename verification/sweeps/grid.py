@@ -68,10 +68,8 @@ AXES: dict[str, Callable[[Any], Any]] = {
 class SweepGrid:
     """The values of the axes that vary.
 
-    Attributes
-    ----------
-    axes : mapping from the name of an axis to its values
-        In the order of :data:`AXES`; an axis that does not vary is left out and has the value of the problem.
+    ``axes`` has their values by name, in the order of :data:`AXES`; an axis that does not vary is left out and has the
+    value of the problem.
 
     Examples
     --------

@@ -203,12 +203,8 @@ class SharedBodies:
 def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: SharedBodies | None = None) -> Row:
     """Run a problem with other values, and return the row of results.
 
-    Parameters
-    ----------
-    values : mapping
-        As :meth:`verification.sweeps.grid.SweepGrid.rows` yields them: the name of an axis to its value.
-    bodies : SharedBodies, optional
-        Condensed bodies of the same problem; no digit of the row depends on it.
+    ``values`` are as :meth:`verification.sweeps.grid.SweepGrid.rows` yields them: the name of an axis to its value.
+    ``bodies`` are condensed bodies of the same problem; no digit of the row depends on them.
 
     Returns
     -------
@@ -411,15 +407,8 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, pieces: KnownPieces) -
 class _Went:
     """A run to its end.
 
-    Attributes
-    ----------
-    outcome : Outcome
-    seen : list of State
-        Every evaluation until it ended.
-    paper : int or None
-        n at which the test of Section 6.3 is met.
-    why : str
-        The error that ended it before that test was met.
+    ``seen`` are all evaluations until it ended, ``paper`` is n at which the test of Section 6.3 is met, ``why`` the
+    error that ended it before that.
     """
 
     outcome: Outcome
