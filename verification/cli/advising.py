@@ -33,22 +33,21 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, kind: Kind) -
     from verification.coupling.matrix_files import names_in, read_matrix, read_vector
     from verification.interface.files import NEEDED
 
-    context = click.get_current_context()
     S1, S2 = given["S1"], given.get("S2")
-    options = {parameter.name: parameter.opts[0] for parameter in context.command.params}
+    options = {parameter.name: parameter.opts[0] for parameter in click.get_current_context().command.params}
     others = [option for name, option in options.items() if name in given and name not in ("S1", "S2")]
     held = set(names_in(S1)) if S2 in (None, S1) else set()
     if set(NEEDED) <= held:
         if others:
-            raise click.UsageError(f"received {others[0]} with {S1}: an interface file has all of it", context)
+            raise click.UsageError(f"received {others[0]} with {S1}: an interface file has all of it")
         if kind.parallel or not kind.signed:
             needed = "an interface file is of two bodies in serial coupling, which are tied or in contact"
-            raise click.UsageError(f"received {kind.typed}with {S1}: {needed}", context)
+            raise click.UsageError(f"received {kind.typed}with {S1}: {needed}")
         return advise(S1, tied=kind.linear, progress=tell)
     if S2 is None and not {"S1", "S2"} <= held:
-        raise click.UsageError(f"{S1}: needed both --S1 and --S2, or one file with arrays S1 and S2", context)
+        raise click.UsageError(f"{S1}: needed both --S1 and --S2, or one file with arrays S1 and S2")
     if held & {"S1", "S2"} == {"S1"}:
-        raise click.UsageError(f"{S1}: needed arrays S1 and S2 for --S2 as well, received S1 alone", context)
+        raise click.UsageError(f"{S1}: needed arrays S1 and S2 for --S2 as well, received S1 alone")
     values: dict[str, Any] = {"S1": read_matrix(S1, "S1"), "S2": read_matrix(S2 or S1, "S2")}
     reads = {"transfer": read_matrix, "kernel": read_matrix, "x": read_vector, "weights": read_vector}
     for name, read in reads.items():
@@ -65,7 +64,7 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, kind: Kind) -
         return advise_matrices(**values, kind=kind, progress=tell)
     except (ValueError, MemoryError) as error:
         of_option = isinstance(error, HypothesisError) and error.key == "friction"
-        raise click.UsageError(f"--{error}" if of_option else f"{files}: {error}", context) from None
+        raise click.UsageError(f"--{error}" if of_option else f"{files}: {error}") from None
 
 
 def _grids(transfer: Path, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -97,10 +96,9 @@ def of_kind(command: Callable[..., None]) -> Callable[..., None]:
         try:
             of = kind_of(kind, tied=tied, parallel=parallel)
         except ValueError as error:
-            raise click.UsageError(str(error), click.get_current_context()) from None
+            raise click.UsageError(str(error)) from None
         if parallel and given.get("snippets"):
-            needed = "received --snippets with --parallel: the blocks are of serial coupling"
-            raise click.UsageError(needed, click.get_current_context())
+            raise click.UsageError("received --snippets with --parallel: the blocks are of serial coupling")
         command(kind=of, **given)
 
     return typed
@@ -145,16 +143,15 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
       ndtheory advise my.toml --snippets preCICE
       ndtheory advise results/interface.npz
     """
-    context = click.get_current_context()
     _no_document_of(snippets, as_json)
     meant = "" if file.suffix else did_you_mean(str(file), advise.commands)
     if meant and not file.exists():
-        raise click.UsageError(f"{file}: no such file, and no command{meant}", context)
+        raise click.UsageError(f"{file}: no such file, and no command{meant}")
     changed = [option for option, given in (("--set", keys), ("--swap-roles", swap)) if given]
     if file.suffix == ".npz" and changed:
-        raise click.UsageError(f"received {changed[0]} with {file}: it changes a problem file", context)
+        raise click.UsageError(f"received {changed[0]} with {file}: it changes a problem file")
     if file.suffix in (".log", ".csv", ".dat"):
-        raise click.UsageError(f"{file}: for a log type ndtheory advise run --log {file} --theta X", context)
+        raise click.UsageError(f"{file}: for a log type ndtheory advise run --log {file} --theta X")
     problem = file if file.suffix == ".npz" else load_problem(file, keys, swap=swap)
     from verification.coupling import from_problems
 
@@ -172,7 +169,7 @@ def _number(needed: str, fits: Callable[[Fraction], bool]) -> Callable[..., str 
         except (ValueError, OverflowError):
             good = False
         if not good:
-            raise click.UsageError(f"--{parameter.name} = {value}: needed {needed}", context)
+            raise click.UsageError(f"--{parameter.name} = {value}: needed {needed}")
         return value
 
     return read
@@ -301,30 +298,31 @@ def run(
       ndtheory advise run --kind general --theta 1 --ratio 0.885
       ndtheory advise run --log out.txt --theta 0.5 --pattern 'res = (\\S+)'
     """
-    context = click.get_current_context()
     _no_document_of(snippets, as_json)
     if bool(logs) == bool(ratios):
         received = "--log with --ratio: a log shows its own ratio" if logs else "neither --log nor --ratio"
-        raise click.UsageError(f"received {received}: needed one of --log and --ratio", context)
+        raise click.UsageError(f"received {received}: needed one of --log and --ratio")
     of_logs = {"--pattern": pattern, "--format": name, "--log10": log10}
     if not logs and (alone := [option for option, value in of_logs.items() if value]):
-        raise click.UsageError(f"received {alone[0]} without --log", context)
+        raise click.UsageError(f"received {alone[0]} without --log")
     if pattern is not None and name is not None:
-        raise click.UsageError("received --pattern with --format: needed one of them", context)
+        raise click.UsageError("received --pattern with --format: needed one of them")
     if len(ratios) > 1 and kind.signed:
         needed = "needed one, or the --log of each; several ratios are of --kind general"
-        raise click.UsageError(f"received {len(ratios)} --ratio: {needed}", context)
+        raise click.UsageError(f"received {len(ratios)} --ratio: {needed}")
     try:
         kind.assumes(friction)
     except ValueError as error:
-        raise click.UsageError(str(error), context) from None
+        raise click.UsageError(str(error)) from None
     from verification.coupling.from_logs import advise_logs
     from verification.coupling.from_runs import advise_run
     from verification.coupling.log_lines import PatternError
 
     try:
         given = _thetas_of(logs, thetas, {"pattern": pattern, "name": name, "log10": log10})
-        _counted(given, logs, ratios, thetas)
+        if len(given) != max(len(logs), len(ratios)):
+            received = f"received {len(thetas)} --theta with {len(logs)} --log and {len(ratios)} --ratio"
+            raise click.UsageError(f"{received}: needed one --theta for each of them")
         if logs:
             form: dict[str, Any] = {"pattern": pattern, "format": name, "log10": log10}
             found = advise_logs(zip(logs, given, strict=True), kind=kind, friction=friction, **form)
@@ -333,18 +331,10 @@ def run(
             found = advise_run(*last, kind=kind, friction=friction, earlier=earlier)
     except PatternError as error:
         what = f"--format = {name}" if pattern is None else f"--pattern = {pattern}"
-        raise click.UsageError(f"{what}: {error}", context) from None
+        raise click.UsageError(f"{what}: {error}") from None
     except HypothesisError as error:
-        raise click.UsageError(f"--{error}", context) from None
+        raise click.UsageError(f"--{error}") from None
     _show(found, snippets, as_json)
-
-
-def _counted(given: Sequence[str | None], logs: Sequence[Path], ratios: Sequence[str], thetas: Sequence[str]) -> None:
-    """UsageError where a log or a ratio has no theta."""
-    if len(given) != max(len(logs), len(ratios)):
-        received = f"received {len(thetas)} --theta with {len(logs)} --log and {len(ratios)} --ratio"
-        context = click.get_current_context()
-        raise click.UsageError(f"{received}: needed one --theta for each of them", context)
 
 
 def _thetas_of(logs: Sequence[Path], thetas: Sequence[str], form: Mapping[str, Any]) -> Sequence[str | None]:
@@ -374,13 +364,13 @@ def _shape(context: click.Context, parameter: click.Parameter, value: str | None
     for word in value.split(",") if value else ():
         if word not in SHAPES:
             needed = f"some of {', '.join(SHAPES)}{did_you_mean(word, SHAPES)}"
-            raise click.UsageError(f"--shape = {word}: needed {needed}", context)
+            raise click.UsageError(f"--shape = {word}: needed {needed}")
         key, meant = SHAPES[word]
         if found.get(key, meant) != meant and key != "mirror":
-            raise click.UsageError(f"--shape = {value}: needed one {key}, received two", context)
+            raise click.UsageError(f"--shape = {value}: needed one {key}, received two")
         found[key] = [*found.get(key, ()), meant] if key == "mirror" else meant
     if found.get("flat") and "mirror" not in found:
-        raise click.UsageError(f"--shape = {value}: needed mirror-1 or mirror-2 with flat", context)
+        raise click.UsageError(f"--shape = {value}: needed mirror-1 or mirror-2 with flat")
     return found
 
 
@@ -439,18 +429,17 @@ def moduli(shape: dict[str, Any], kind: Kind, as_json: bool, **given: str | None
       ndtheory advise moduli --density 1000,1200 --thickness 1e-3 \\
         --length 0.05,0.005
     """
-    context = click.get_current_context()
     data: dict[str, Any] = {name: value.split(",") for name, value in given.items() if value is not None}
     if not {"young", "conductivity", "film", "density"} & data.keys():
         received = f"received {f'--{min(data)} alone' if data else 'no material'}"
-        raise click.UsageError(f"{received}: needed --young and --poisson, --conductivity, or --density", context)
+        raise click.UsageError(f"{received}: needed --young and --poisson, --conductivity, or --density")
     from verification.coupling.from_moduli import advise_moduli
 
     try:
         found = advise_moduli(**data, **shape, kind=kind)
     except HypothesisError as error:
         option = "--shape, " if error.key in ("plane", "corners", "mirror", "flat") else "--"
-        raise click.UsageError(f"{option}{error}", context) from None
+        raise click.UsageError(f"{option}{error}") from None
     _show(found, None, as_json)
 
 
@@ -474,19 +463,18 @@ def vectors(iterates: Path, images: Path | None, kind: Kind, snippets: str | Non
       ndtheory advise vectors run.npz
       ndtheory advise vectors X.npy TX.npy --tied --snippets preCICE
     """
-    context = click.get_current_context()
     _no_document_of(snippets, as_json)
     from verification.coupling.from_vectors import advise_vectors
     from verification.coupling.matrix_files import names_in, read_matrix
 
     if images is None and not {"X", "TX"} <= set(names_in(iterates)):
-        raise click.UsageError(f"{iterates}: needed X and TX, or one file with arrays X and TX", context)
+        raise click.UsageError(f"{iterates}: needed X and TX, or one file with arrays X and TX")
     X, TX = read_matrix(iterates, "X"), read_matrix(images or iterates, "TX")
     try:
         found = advise_vectors(X, TX, kind=kind)
     except ValueError as error:
         files = ", ".join(map(str, dict.fromkeys([iterates, images or iterates])))
-        raise click.UsageError(f"{files}: {error}", context) from None
+        raise click.UsageError(f"{files}: {error}") from None
     _show(found, snippets, as_json)
 
 
@@ -496,8 +484,7 @@ cli.add_command(advise)
 
 def _no_document_of(snippets: str | None, as_json: bool) -> None:
     if snippets is not None and as_json:
-        needed = "received --snippets with --json: a block to paste is no JSON document"
-        raise click.UsageError(needed, click.get_current_context())
+        raise click.UsageError("received --snippets with --json: a block to paste is no JSON document")
 
 
 def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | None = None) -> None:
@@ -507,8 +494,7 @@ def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | Non
 
     if snippets is not None and found.theta is not None:
         if found.theta > 1:
-            needed = f"received --snippets where theta = {found.theta:g}: the libraries take at most 1"
-            raise click.UsageError(needed, click.get_current_context())
+            raise click.UsageError(f"received --snippets where theta = {found.theta:g}: the libraries take at most 1")
         deliver(found, lambda found: blocks(found, snippets), as_json)
         if found.advised_exchanged:
             complain(f"the roles are as they are: {found.advised_exchanged}")

@@ -65,13 +65,13 @@ def bounds(
     of_section_5 = {key: given[key] for key in SECTION_5}
     of_norms = {key: given[key] for key in ENERGY}
     if check and theta is None:
-        raise click.UsageError("--check needs --theta", click.get_current_context())
+        raise click.UsageError("--check needs --theta")
     alone = of_norms["rho"] is not None and not any(
         of_section_5[key] is not None for key in ("m", "M", "C_R", "C_K", "C_s", "C_tr")
     )
     constants = None if alone else _constants(of_section_5)
     if target is not None and constants is None:
-        raise click.UsageError("-o draws h_1 and h_2: it needs --m, --M, --CR and --CK", click.get_current_context())
+        raise click.UsageError("-o draws h_1 and h_2: it needs --m, --M, --CR and --CK")
     friction = (
         take("k", 0 if given["k"] is None else given["k"], "a number k >= 0", lambda k: k >= 0)
         if constants is None
@@ -101,7 +101,7 @@ def _constants(given: Mapping[str, str | None]) -> Constants:
     for key in ("m", "M", "C_R"):
         if given[key] is None:
             needed = "needed --m, --M, --CR and --CK, or --rho"
-            raise click.UsageError(f"{OPTIONS[key]} is missing: {needed}", click.get_current_context())
+            raise click.UsageError(f"{OPTIONS[key]} is missing: {needed}")
     return Constants(**{key: value for key, value in given.items() if value is not None})
 
 
@@ -112,7 +112,7 @@ def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | No
         return None
     if given["rho"] is None or len(missing) == 1 or (rubs and missing):
         needed = "the bound in energy norms needs --rho, and with friction --kappa1 and --kappa2"
-        raise click.UsageError(f"{', '.join(missing)} missing: {needed}", click.get_current_context())
+        raise click.UsageError(f"{', '.join(missing)} missing: {needed}")
     try:
         return EnergyConstants(**{key: value for key, value in given.items() if value is not None})
     except HypothesisError as error:

@@ -85,7 +85,6 @@ def certify(
       ndtheory certify --check certificate.json my.toml
       ndtheory certify --continuum my.toml --theta 0.6
     """
-    context = click.get_current_context()
     used = {"--theta": theta, "-o": target, "--edition": edition, "--check": given}
     used |= {"--exact": exact or None, "--continuum": continuum or None}
     used["--norm lyapunov"] = norm if norm != "energy" else None
@@ -96,9 +95,9 @@ def certify(
         ("--edition", "--exact"),
     ):
         if clash := [other for other in others if None not in (used[other], used[option])]:
-            raise click.UsageError(f"received {clash[0]} with {option}: needed one of both", context)
+            raise click.UsageError(f"received {clash[0]} with {option}: needed one of both")
     if file is None and given is None:
-        raise click.UsageError("received nothing: needed FILE, or --check FILE.json", context)
+        raise click.UsageError("received nothing: needed FILE, or --check FILE.json")
     typed = None if file is None else Typed(file=file, keys=keys, theta=theta, swap=swap)
     problem = None if typed is None else load(typed)
     if given is not None:

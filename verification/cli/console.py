@@ -301,7 +301,10 @@ def fail(error: Exception, outcome: str = "error", lead: str = "") -> int:
 
 
 def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap a command: only its result reaches stdout; Ctrl-C is one line, and so is a solver that fails."""
+    """Wrap a command: only its result reaches stdout; Ctrl-C is one line, and so is a solver that fails.
+
+    An error of usage names the command.
+    """
 
     @functools.wraps(command)
     def run(*args: Any, **options: Any) -> Any:
@@ -311,6 +314,9 @@ def guarded(command: Callable[..., Any]) -> Callable[..., Any]:
             except KeyboardInterrupt as error:
                 complain(str(error) or interruption())
                 return INTERRUPTED
+            except click.UsageError as error:
+                error.ctx = error.ctx or click.get_current_context()
+                raise
             except RuntimeError as error:
                 from verification.algorithm.monolithic import SolveError
                 from verification.contact import ContactError  # numpy: only now

@@ -38,4 +38,4 @@ def schema(name: str | None) -> None:
     try:
         say(json.dumps(found(name), indent=2, ensure_ascii=False))
     except ValueError as error:
-        raise click.UsageError(str(error), click.get_current_context()) from None
+        raise click.UsageError(str(error)) from None

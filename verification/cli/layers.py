@@ -58,5 +58,5 @@ def layers(
             young=E, poisson=nu, depth=d, friction=friction, radius=radius, theta=theta, verified=verified
         )
     except HypothesisError as error:
-        raise click.UsageError(f"--{error}", click.get_current_context()) from None
+        raise click.UsageError(f"--{error}") from None
     deliver(found, Document.sections, as_json, writing(target, as_figure), target)

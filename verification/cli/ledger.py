@@ -94,10 +94,9 @@ def _named(id: str) -> list[str]:
     if not parts:
         near = nearest(id, known, most=3)
         meant = f"similar: {', '.join(near)}" if near else "`ndtheory verify` lists all"
-        context = click.get_current_context()
         from verification.problem.tables import short
 
-        raise click.UsageError(f"{short(id)!r}: no such statement; {meant}", context)
+        raise click.UsageError(f"{short(id)!r}: no such statement; {meant}")
     return parts
 
 

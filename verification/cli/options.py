@@ -28,7 +28,7 @@ def _pairs(context: click.Context, parameter: click.Parameter, given: Sequence[s
         key, equals, value = words.partition("=")
         if not equals:
             needed = f"{words!r}: needed KEY=VALUE, as contact.friction=0.4"
-            raise click.BadParameter(needed, context, parameter)
+            raise click.BadParameter(needed)
         pairs.pop(key, None)  # the last one is set last
         pairs[key] = value
     return pairs
@@ -86,7 +86,7 @@ def _bounds(context: click.Context, parameter: click.Parameter, value: str | Non
     try:
         return None if value is None else chosen(value)
     except ValueError as error:
-        raise click.BadParameter(str(error), context, parameter) from None
+        raise click.BadParameter(str(error)) from None
 
 
 BOUNDS = click.option(
@@ -110,7 +110,7 @@ SOLVER = click.option(
 def folder_name(context: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
     """The folder of ``-o``; an empty name is refused."""
     if value == "":
-        raise click.BadParameter("'': needed the name of a folder", context, parameter)
+        raise click.BadParameter("'': needed the name of a folder")
     return None if value is None else Path(value)
 
 
@@ -127,7 +127,7 @@ def one_file(
         if value is None or context.resilient_parsing:
             return value
         if value.suffix not in endings:
-            raise click.BadParameter(f"{str(value)!r}: needed {needed}", context, parameter)
+            raise click.BadParameter(f"{str(value)!r}: needed {needed}")
         from verification.output.files import check_ours
         from verification.problem.tables import ProblemError
 

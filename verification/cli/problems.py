@@ -71,9 +71,9 @@ def example(name: str | None, inputs: Path | None, as_json: bool) -> None:
       ndtheory example section6 > my.toml
       ndtheory example --inputs trial
     """
-    available, context = examples(), click.get_current_context()
+    available = examples()
     if name is not None and inputs is not None:
-        raise click.UsageError(f"received {name} and --inputs: needed one of them", context)
+        raise click.UsageError(f"received {name} and --inputs: needed one of them")
     if inputs is not None:
         from verification.output.inputs import INPUTS, write_inputs
 
@@ -92,7 +92,7 @@ def example(name: str | None, inputs: Path | None, as_json: bool) -> None:
     else:
         from verification.problem.examples import unknown_example
 
-        raise click.UsageError(unknown_example(name, available), context)
+        raise click.UsageError(unknown_example(name, available))
     say(found.to_json() if as_json else "\n".join(shown))
 
 
@@ -255,7 +255,7 @@ def compare(
 
         if all(registry.BOUNDS[name].calculated for name in bounds):
             needed = "needed a bound among them that can be brought closer"
-            raise click.UsageError(f"received --exact with --bounds {','.join(bounds)}: {needed}")
+            raise click.ClickException(f"received --exact with --bounds {','.join(bounds)}: {needed}")
     return _compare(load(typed), typed, folder, solver, as_json, bounds=bounds, **asked)
 
 

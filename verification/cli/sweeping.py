@@ -41,7 +41,7 @@ def _axes(context: click.Context, parameter: click.Parameter, given: tuple[str, 
         unknown = [name for name in names if name not in (*GIVEN, *RESULTS)]
         if unknown or len(names) not in (2, 3):
             needed = f"needed X,Y or X,Y,CURVES with columns of {', '.join((*GIVEN, *RESULTS))}"
-            raise click.BadParameter(f"{words!r}: {needed}", context, parameter)
+            raise click.BadParameter(f"{words!r}: {needed}")
     return plots
 
 
@@ -105,7 +105,7 @@ def sweep(
     from verification.sweeps.workers import work_of
 
     if dask is not None and jobs is not None:
-        raise click.UsageError("needed either --jobs, for this machine, or --dask, for a cluster")
+        raise click.ClickException("needed either --jobs, for this machine, or --dask, for a cluster")
     for option in (name for name, given in (("--export", export), ("--dask", dask)) if given is not None):
         require(option)
     problem, grid = read_sweep(file)
