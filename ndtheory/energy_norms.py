@@ -332,9 +332,7 @@ class EnergyBounds(Answer):
     ratio: Number = key(
         "the largest ratio of the differences of displacement of the contact body and of the Neumann body"
     )
-    friction_multiple: Number | None = key(
-        "by which friction may grow until no small theta is proved", null="without friction", why="no friction"
-    )
+    friction_multiple: Number | None = key("by which friction may grow until no small theta is proved", **_RUBS)
     friction_limit_multiple: Number | None = key("by which it may grow until no theta is proved", **_RUBS)
     theta_proved: float | None = key("the theta of least factor", **_PROVED)
     factor_proved: Number | None = key("the factor there", **_PROVED)

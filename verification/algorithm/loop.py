@@ -136,11 +136,6 @@ class Evaluation(NamedTuple):
     residual: float
     scale: float
 
-    @property
-    def relative(self) -> float:
-        """``|T g - g| / |T g|``."""
-        return self.residual / self.scale if self.scale else math.inf if self.residual else 0.0
-
 
 def evaluations(
     T: Callable[[Floats], Floats], step: Callable[[Floats, Floats], Floats], g: Floats

@@ -56,8 +56,6 @@ def noise(pair: ContactPair, iterate: Iterate) -> float:
 
 def noises(pair: ContactPair, iterates: Sequence[Iterate]) -> list[float]:
     """Return the :class:`Noise` of each of some iterates."""
-    if not iterates:
-        return []
     g = np.stack([iterate.g for iterate in iterates], axis=1)
     u = np.stack([iterate.displacement for iterate in iterates], axis=1)
     found: list[float] = Noise(pair).of(g, u).tolist()

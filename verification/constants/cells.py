@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
 
 from fem1d2d.element import lacks
 from fem1d2d.layers import FacingLayers, Layer, peaks
 from ndtheory import Number
-from ndtheory.keys import plain
 from ndtheory.moduli import half_planes
 from verification.interface import assembly
 from verification.interface.body import material_of
@@ -44,11 +42,6 @@ class OfCells:
     numbers: Mapping[str, Number]
     why: str = ""
     unverified: str = ""
-
-    def objects(self) -> tuple[dict[str, Any], dict[str, str]]:
-        """Both as a document has them, and the entries of its ``reason``."""
-        numbers = {name: plain(self.numbers.get(name)) for name in NAMES}
-        return numbers, {} if self.numbers else dict.fromkeys(NAMES, self.why)
 
 
 def rho_of_cells(problem: Problem | None, *, verified: bool = False) -> OfCells:

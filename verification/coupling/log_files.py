@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from io import StringIO
@@ -199,8 +199,10 @@ def _read_lines(path: Path, text: str, form: Form, log10: bool) -> Log:
     """
     other = None if form.accelerator is None else form.accelerator.search(text)
     found = _Lines(path, form.once, log10)
-    for line, match in _matches(text, form):
-        found.add(line, match)
+    for line, content in enumerate(StringIO(text), 1):
+        if not form.words or any(word in content for word in form.words):  # the others are many, and searched slowly
+            for match in form.line.finditer(content):
+                found.add(line, match)
     if not found.windows:
         raise _refused(path, form.needed)
     first = next(iter(found.windows.values()))
@@ -299,13 +301,6 @@ def _last_of(blocks: list[list[float]]) -> list[list[float]]:
     """Blocks without those that the next one repeats and continues."""
     pairs = zip(blocks, [*blocks[1:], []], strict=True)
     return [block for block, after in pairs if after[: len(block)] != block]
-
-
-def _matches(text: str, form: Form) -> Iterator[tuple[int, re.Match[str]]]:
-    for line, content in enumerate(StringIO(text), 1):
-        if not form.words or any(word in content for word in form.words):  # the others are many, and searched slowly
-            for match in form.line.finditer(content):
-                yield line, match
 
 
 # --- columns of numbers -----------------------------------------------------------------------------------------------

@@ -33,7 +33,6 @@ ONE_WAVE = "one wave bounds rho from below"
 #: Reason against the fluid as the Neumann body.
 SHORT_WAVES = "short waves have less and less added mass, so that rho would grow without end as meshes are refined"
 
-
 #: The same against a fluid with a film coefficient.
 SHORT_WAVES_OF_HEAT = "short waves meet more and more conductance of the wall: rho would grow as meshes are refined"
 
