@@ -26,15 +26,8 @@ RENEWED = 8
 class FixedPointMap:
     """T of (5.4) for a pair of bodies: steps I and II, with g in, T g out.
 
-    Parameters
-    ----------
-    pair : ContactPair
-        The bodies with their loads and roles.
-    solver : {'auto', 'cvxpy', 'active-set'}
-    step : type, optional
-        The class that solves step II.
-    systems : Systems, optional
-        Linear systems to share with maps of pairs with this contact body; no digit of T depends on it.
+    ``pair`` has the bodies with their loads and roles, ``step`` is the class that solves step II; ``systems`` are
+    linear systems to share with maps of pairs with this contact body, on which no digit of T depends.
     """
 
     def __init__(

@@ -26,14 +26,8 @@ RUNAWAY = 1e8
 class Outcome(StrEnum):
     """The outcome of an iteration: a text, with words for sentences.
 
-    Attributes
-    ----------
-    words : str
-        The outcome in a sentence.
-    seen : str
-        What was seen at the end.
-    why : str
-        Reason why no number of steps to a solution follows, as a format that takes the ``steps``.
+    ``words`` are the outcome in a sentence, ``seen`` says what was seen at the end, and ``why`` no number of steps to a
+    solution follows, as a format that takes the ``steps``.
 
     Examples
     --------

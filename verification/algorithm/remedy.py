@@ -22,20 +22,10 @@ LONGEST = 20_000
 class Remedy:
     """A change of the problem that may let a run converge, with its reason.
 
-    Attributes
-    ----------
-    why : str
-        The outcome, and what caused it.
-    value, key : str
-        A new value, and the key of the problem file that gets it.
-    advice : str
-        The advice in words; where it is empty, a theta is advised.
-    formula : str
-        The formula of that theta; may be empty.
-    exchanged : str or None
-        A theta for exchanged roles where that is larger; None where that is not advised.
-    constant : bool
-        True if the rule of the run takes no theta, so that the advice is about constant relaxation.
+    ``why`` has the outcome, and what caused it; ``key`` of the problem file gets the new ``value``.  ``advice`` is in
+    words; where it is empty, a theta is advised, by a ``formula``, which may be empty.  ``exchanged`` is a theta for
+    exchanged roles where that is larger, None where that is not advised.  The advice is about constant relaxation if
+    ``constant``: the rule of the run takes no theta.
     """
 
     why: str

@@ -58,13 +58,8 @@ THETA, ROUGH = 2e-2, 1e-2
 class Proved:
     """A factor of one step in a norm.
 
-    Attributes
-    ----------
-    theta, factor : float
-        Checked: the form is positive definite, rounding included.
-    norm : ForceNorm
-    multipliers : tuple of arrays
-        As :class:`verification.semidefinite.multipliers.Certified` has them.
+    ``theta`` and ``factor`` are checked: the form is positive definite, rounding included; ``multipliers`` are as
+    :class:`verification.semidefinite.multipliers.Certified` has them.
     """
 
     theta: float

@@ -117,14 +117,9 @@ class Trial:
 class WorstTally:
     """The worst ratio of one inequality so far.
 
-    Attributes
-    ----------
-    pairs, problems, apart : int
-        How many were compared; in how many of the problems the grids differ.
-    by_unit : dict
-        Unit of stress -> the worst ratio, where, the theta, and the name of the problem.
-    worst_apart : float
-        The worst ratio where the grids differ, in any unit of stress; -inf where nothing was compared there.
+    ``pairs`` and ``problems`` were compared, and in ``apart`` of the problems the grids differ.  ``by_unit`` has for
+    each unit of stress the worst ratio, where, the theta, and the name of the problem; ``worst_apart`` is the worst
+    ratio where the grids differ, in any unit of stress, -inf where nothing was compared there.
     """
 
     inequality: Inequality

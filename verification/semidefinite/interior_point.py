@@ -117,16 +117,10 @@ class Program:
 class Optimum:
     """A solver's answer.
 
-    Attributes
-    ----------
-    s, y : float, array of shape (K,)
-        The value and the multipliers.
-    moments : array, shape (d, d)
-        The dual variable of the matrix: the second moments of the pairs of forces that are worst for it.
-    steps, converged : int, bool
-        Number of steps; True if the gap to the dual value is below the accuracy asked for.
-    early : (float, array of shape (K,)), optional
-        s and y close to the central path and far from its end: a program with more conditions may start there.
+    ``s`` is the value, ``y``, shape (K,), are the multipliers; ``moments``, shape (d, d), are the dual variable of the
+    matrix: the second moments of the pairs of forces that are worst for it.  It has ``converged`` if the gap to the
+    dual value is below the accuracy asked for.  ``early`` are s and y close to the central path and far from its end: a
+    program with more conditions may start there.
     """
 
     s: float

@@ -71,18 +71,9 @@ NOT_CERTIFIED = "checked in doubles with a bound on their rounding, for the inte
 class Enclosure:
     """Bounds of the Lipschitz constant of T_theta in the norm (5.21), or in another one, over all loads and gaps.
 
-    Attributes
-    ----------
-    upper, whole : Certified
-        Proved by multipliers for every set of pieces, and by one program for all pieces together.
-    lower, piece : float, Piece
-        The largest ``|J|`` found, and its piece; its spectral radius in another norm.
-    tree : Leaf or Division
-        The sets of pieces into which all were divided, with the proof of each.
-    programs : int
-        Number of programs that were solved.
-    norm : ForceNorm or None
-        None for (5.21).
+    ``upper`` is proved by multipliers for every set of pieces, ``whole`` by one program for all pieces together.
+    ``lower`` is the largest ``|J|`` found, of ``piece``; its spectral radius in another norm.  ``tree`` has the sets of
+    pieces into which all were divided, with the proof of each; ``programs`` were solved; ``norm`` is None for (5.21).
     """
 
     upper: Certified
@@ -282,19 +273,10 @@ def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[
 class Semidefinite(Part):
     """Result of the semidefinite bound for a pair of bodies at one theta.
 
-    Attributes
-    ----------
-    lipschitz : Number
-        In the norm (5.21), checked in doubles with a bound on their rounding.
-    gave_up : str
-        Why the solver proposed no multipliers at this theta, so that ``lipschitz`` comes from the known ones.
-    whole, divided : Certified or None, Number or None
-        The proof of one program for all pieces of T together, and the smaller ``lipschitz`` in doubles, beside a proved
-        one.
-    largest : tuple of arrays
-        The multipliers behind ``theta_max``, over theta.
-    not_proved : str
-        Why ``lipschitz`` is not proved.
+    ``lipschitz`` is in the norm (5.21), checked in doubles with a bound on their rounding; ``not_proved`` says why it
+    is not proved, ``gave_up`` why the solver proposed no multipliers at this theta, so that it comes from the known
+    ones. ``whole`` is the proof of one program for all pieces of T together, ``divided`` the smaller ``lipschitz`` in
+    doubles, beside a proved one; ``largest`` are the multipliers behind ``theta_max``, over theta.
     """
 
     part: ClassVar[str] = "Semidefinite bound"

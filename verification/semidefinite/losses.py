@@ -38,14 +38,10 @@ class Suprema:
 
     Each is a power of the moduli times a number of the geometry.
 
-    Attributes
-    ----------
-    reaction, energy : float
-        Of the contact body's reaction, in the dual norm over its displacement, and in the norm (5.21) over its energy.
-    force, displacement : float
-        Of the dual norm of a force and of the Neumann body's displacement, over the norm (5.21) of the force.
-    displacement_dual, force_dual : float
-        Of the Neumann body's displacement and of the norm (5.21), over the dual norm of the force.
+    ``reaction`` and ``energy`` are of the contact body's reaction, in the dual norm over its displacement, and in the
+    norm (5.21) over its energy; ``force`` and ``displacement`` of the dual norm of a force and of the Neumann body's
+    displacement, over the norm (5.21) of the force; ``displacement_dual`` and ``force_dual`` of the Neumann body's
+    displacement and of the norm (5.21), over the dual norm of the force.
     """
 
     reaction: float

@@ -75,17 +75,11 @@ SHARES = tuple(1e-11 * 2.0**k for k in range(31))
 class Certified:
     """A value with the multipliers that prove it.
 
-    Attributes
-    ----------
-    value, evaluated, proposed : float
-        Proved by the multipliers, on the safe side of ``evaluated`` by a bound on the rounding of the check; the
-        eigenvalue that they give in doubles; the solver's optimum, nan where the multipliers are the known ones.
-    multipliers : tuple of arrays
-        lambda, tau, a, b by node; only lambda without friction.
-    gave_up : str
-        Why the solver proposed nothing; empty where it did.
-    early : (float, tuple of arrays), optional
-        The value and lambda, tau, k a, k b far from the end of the central path: a start for a friction nearby.
+    ``value`` is proved by the multipliers, on the safe side of ``evaluated``, the eigenvalue that they give in doubles,
+    by a bound on the rounding of the check; ``proposed`` is the solver's optimum, nan where the multipliers are the
+    known ones.  ``multipliers`` are lambda, tau, a, b by node, only lambda without friction.  ``gave_up`` says why the
+    solver proposed nothing; empty where it did.  ``early`` is the value with lambda, tau, k a, k b far from the end of
+    the central path: a start for a friction nearby.
     """
 
     value: float

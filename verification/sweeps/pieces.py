@@ -41,16 +41,9 @@ Key = tuple[Pattern, bytes, bytes]
 class Steps:
     """Consecutive evaluations of T on one piece, each an array over the steps.
 
-    Attributes
-    ----------
-    g, u, image : array, shape (2 n, steps)
-        g, its displacement and T g.
-    residual, scale : array, shape (steps,)
-        ``|||T g - g|||`` and the larger of ``|||g|||`` and ``|||T g|||`` in the norm (5.21).
-    piece : tuple
-        The key of the piece.
-    found : Iterate or None
-        The one step, where it was evaluated and not taken with others.
+    ``g``, ``u`` and ``image``, shape (2 n, steps), are g, its displacement and T g; ``residual`` and ``scale``, shape
+    (steps,), are ``|||T g - g|||`` and the larger of ``|||g|||`` and ``|||T g|||`` in the norm (5.21).  ``piece`` is
+    the key of the piece, ``found`` the one step, where it was evaluated and not taken with others.
     """
 
     g: Floats

@@ -209,14 +209,8 @@ class Store:
     The file is created if it does not exist.  With ``fresh`` all rows count as missing, and are replaced once they are
     made again; with ``retry`` the rows do that ended in an error.
 
-    Attributes
-    ----------
-    rows : dict
-        The rows that are there, by their places in the grid.
-    plan : Plan
-        Their number, and how many rows are not used.
-    kept : int
-        Number of rows that were added.
+    ``rows`` are there, by their places in the grid; ``plan`` has their number, and how many rows are not used; ``kept``
+    counts those that were added.
 
     Raises
     ------
