@@ -246,22 +246,10 @@ def bilinear(name: str) -> Callable[[Any, Any], Any]:
 class Check:
     """The decision of a statement, as printed and as repaired, with mutants that must fail.
 
-    Attributes
-    ----------
-    id : str
-        The id of the statement.
-    text : str
-        What the check shows.
-    goals : callable
-        A form of the statement (a formula, a sign, ..) -> goals.
-    forms : mapping
-        'printed', 'step', 'repaired' -> form.
-    mutants : mapping
-        What was changed -> form that must be refuted.
-    units : mapping
-        'printed', 'repaired' -> relations whose units are compared.
-    one_case : bool
-        True if only one case is computed, such as a bar: it may refute a form and cannot prove one.
+    ``text`` says what the check of the statement ``id`` shows.  ``goals`` takes a form of the statement (a formula, a
+    sign, ..) to goals; ``forms`` are 'printed', 'step' and 'repaired', and each of the ``mutants``, by what was
+    changed, must be refuted.  ``units`` has relations whose units are compared.  It is ``one_case`` if only one is
+    computed, such as a bar: it may refute a form and cannot prove one.
     """
 
     id: str

@@ -78,16 +78,9 @@ def _over(number: Number | None, k: Fraction) -> Number | None:
 class Subject:
     """Constants that were given, or measured of a pair, for which a bound is evaluated.
 
-    Attributes
-    ----------
-    constants, energy : Constants or None, EnergyConstants or None
-        The constants of Section 5, and of the theorem in energy norms.
-    pair, measured : ContactPair or None, Measured or None
-        The bodies and their constants; None where only constants were given.
-    why, why_energy : str
-        Why the constants of Section 5, and those in energy norms, do not exist.
-    exact : bool
-        True if a bound that can be brought closer to the Lipschitz constant is, however long that takes.
+    ``constants`` are of Section 5, ``energy`` of the theorem in energy norms; ``why`` and ``why_energy``
+    say why they do not exist.  ``pair`` and ``measured`` are the bodies and their constants; None where only constants
+    were given.  A bound that can be brought closer to the Lipschitz constant is if ``exact``, however long that takes.
     """
 
     constants: Constants | None = None
@@ -134,18 +127,10 @@ _FACTOR = {"null": "without a conclusion", "why": _no_factor, "default": None}
 class BoundResult(Part):
     """Result of a bound.
 
-    Attributes
-    ----------
-    proved : bool
-        True if the result is proved; the printed theorem is, where m >= 1.
-    interval_level : {'exact', 'verified', 'guaranteed', 'float'}
-        Of the interval: at any level but ``float`` each theta in it is proved to contract.
-    norm : ForceNorm or None
-        The norm in which the factor holds; None for (5.21).
-    why, not_computed : str
-        Why the factor is missing; why nothing was worked out.
-    detail : object, optional
-        Full result of this bound beyond these attributes, which is the document then.
+    It is ``proved`` or not; the printed theorem is, where m >= 1.  ``interval_level`` is the level of the interval: at
+    any but ``float`` each theta in it is proved to contract.  ``norm`` is the one in which the factor holds; None for
+    (5.21). ``why`` says why the factor is missing, ``not_computed`` why nothing was worked out.  ``detail`` is the full
+    result of this bound beyond these attributes, which is the document then.
     """
 
     part: ClassVar[str] = "Registered bound"

@@ -81,14 +81,9 @@ def no_cells(why: str) -> Suggested:
 def suggest(problem: Problem, rho: Number, *, normal: bool) -> Suggested:
     """Cells with a smaller rho on fine meshes.
 
-    Parameters
-    ----------
-    problem : Problem
-    rho : Number
-        Of the file's mesh, of normal components if ``normal``.  Where it is larger than rho of the cells, long waves
-        or the ends of Gamma_c decide, and other cells change little.
-    normal : bool
-        True without friction, unless the interface is tied.
+    ``rho`` is of the file's mesh, and of normal components if ``normal``, as without friction unless the interface is
+    tied.  Where it is larger than rho of the cells, long waves or the ends of Gamma_c decide, and other cells change
+    little.
 
     Examples
     --------

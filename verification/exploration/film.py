@@ -46,21 +46,11 @@ STATES = ("stick", "slip", "open")
 class FilmedRun(Part):
     """One run as a page shows it.
 
-    Attributes
-    ----------
-    residuals : tuple of float
-        The relative residual of every step.
-    steps : tuple of int
-        The steps at which the bodies are drawn.
-    left_out : int
-        Number of steps at which they would be drawn, but leave the picture.
-    frames : int8 array, shape (steps, bytes)
-        By step: displacements along Gamma_c of body 1 and of body 2, pressure and shear at the contact nodes, each in
-        127ths of its size; the states of these nodes.
-    sizes : tuple of pairs
-        By step: the largest displacement and the largest stress.
-    factors : mapping from str to float or None
-        By bound: the factor that it proves for one step; None where it has no conclusion.
+    ``residuals`` are relative, of every step; at ``steps`` the bodies are drawn, and at ``left_out`` more they would
+    be, but leave the picture.  By step ``frames``, shape (steps, bytes), have displacements along Gamma_c of body 1 and
+    of body 2, pressure and shear at the contact nodes, each in 127ths of its size, and the states of these nodes;
+    ``sizes`` the largest displacement and the largest stress.  ``factors`` are what each bound proves for one step;
+    None where it has no conclusion.
     """
 
     theta: float = key()

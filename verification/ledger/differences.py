@@ -87,18 +87,10 @@ class Difference:
     Where the grids differ, only P leads from the Neumann body to the contact grid: step II stays below ``P w^2_N``,
     with ``P w^2_T`` in the jump, and (5.4) lifts ``P v``.  (5.12) takes ``w~^1 + R_D^1 P (w^2 - w~^2)``.
 
-    Attributes
-    ----------
-    force : array
-        ``psi - psi~``, nodal forces on the Neumann grid.
-    reaction : array
-        ``T psi - T psi~``, on the same grid.
-    d_1, d_2 : array
-        Traces of ``w^1 - w~^1`` on the contact grid and of ``w^2 - w~^2`` on the Neumann grid, unit of length.
-    friction : float
-        The friction term, left side of (5.13); an energy.
-    size : float
-        The energies from which the difference was formed: what rounding is relative to.
+    ``force`` is ``psi - psi~``, nodal forces on the Neumann grid, and ``reaction`` is ``T psi - T psi~``; ``d_1`` and
+    ``d_2`` are the traces of ``w^1 - w~^1`` on the contact grid and of ``w^2 - w~^2`` on the Neumann grid, unit of
+    length. ``friction`` is the friction term, left side of (5.13), an energy; ``size`` are the energies from which the
+    difference was formed: what rounding is relative to.
     """
 
     setting: DrawnSetting

@@ -131,14 +131,9 @@ class EnclosedBodies:
 class Apart:
     """The difference of two solutions on a piece of T where d_2 is u.
 
-    Attributes
-    ----------
-    energy_1, work, friction : Interval
-        ``a^1(w^1 - w~^1, w^1 - w~^1)``, ``<T psi - T psi~, w^2 - w~^2>`` and the friction term.
-    size_1, size_2 : Interval
-        ``|w^a - w~^a|_a`` in H1.
-    norm, norm_T, dual, dual_T : Interval
-        The norm (5.21) of ``psi - psi~`` and of ``T psi - T psi~``, and their norms in the dual of V^2.
+    ``energy_1`` is ``a^1(w^1 - w~^1, w^1 - w~^1)``, ``work`` is ``<T psi - T psi~, w^2 - w~^2>``, ``friction`` the
+    friction term, and ``size_1``, ``size_2`` are ``|w^a - w~^a|_a`` in H1.  ``norm`` and ``norm_T`` are the norm (5.21)
+    of ``psi - psi~`` and of ``T psi - T psi~``, ``dual`` and ``dual_T`` their norms in the dual of V^2.
     """
 
     energy_1: Interval

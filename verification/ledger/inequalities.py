@@ -109,18 +109,9 @@ class RightSides(ABC):
 class Reading(RightSides):
     """The constants as an inequality reads them, and the right sides that contain them.
 
-    Attributes
-    ----------
-    m, M, C_R, C_K : float
-        m is ``min(m, 1)`` from (5.36) on as printed.
-    u : float
-        The stress of the bracket in (5.30): m, or 1 as printed.
-    coercivity : float
-        m itself.
-    C_K_half : float
-        ``k C_s C_tr`` with C_tr into H^1/2 (5.8).
-    energy : tuple of float
-        rho, kappa_1, kappa_2 of the theorem in energy norms.
+    ``m`` is ``min(m, 1)`` from (5.36) on as printed, ``coercivity`` m itself, ``u`` the stress of the bracket in
+    (5.30): m, or 1 as printed.  ``C_K_half`` is ``k C_s C_tr`` with C_tr into H^1/2 (5.8), and ``energy`` has rho,
+    kappa_1, kappa_2 of the theorem in energy norms.
     """
 
     m: float

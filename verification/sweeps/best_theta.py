@@ -97,18 +97,10 @@ class Least:
 class BestTheta:
     """The best theta of a problem in its roles and at its friction.
 
-    Attributes
-    ----------
-    rho, predicted : float
-        rho_normal without friction, rho with it; and ``2/(2 + rho)``.
-    seen : Fewest or None
-        None where no run arrived, or none was made.
-    linearised : Least or None
-        The theta of least spectral radius of the Jacobian of T_theta at the solution.
-    energy, semidefinite : Least or None
-        The theta of least proved factor below 1: of the theorem in energy norms, and of the semidefinite bound.
-    reason : mapping from attribute to text
-        Why one of the four is None.
+    ``rho`` is rho_normal without friction, ``predicted`` is ``2/(2 + rho)``.  ``seen`` is None where no run arrived, or
+    none was made; ``linearised`` is the theta of least spectral radius of the Jacobian of T_theta at the solution;
+    ``energy`` and ``semidefinite`` have the theta of least proved factor below 1, of the theorem in energy norms and of
+    the semidefinite bound.  ``reason`` says why one of the four is None.
     """
 
     rho: float
