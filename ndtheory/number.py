@@ -132,6 +132,12 @@ class Number(Part):
         return cls(value=float(value))
 
     @classmethod
+    def within(cls, value: float, lo: float | None, hi: float | None, level: Level) -> Number:
+        """A value that is moved to an end it lies beyond; one end may be unknown."""
+        value = value if lo is None else max(value, lo)
+        return cls(value=value if hi is None else min(value, hi), lo=lo, hi=hi, level=level)
+
+    @classmethod
     def enclosed(cls, value: Scalar, lo: Scalar, hi: Scalar, level: Level) -> Number:
         """Round a rational or decimal to the nearest double and its ends outward.
 

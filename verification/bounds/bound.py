@@ -69,9 +69,7 @@ def _over(number: Number | None, k: Fraction) -> Number | None:
         return None
     low = None if number.lo is None else below(Fraction(number.lo) / k)
     high = None if number.hi is None else above(Fraction(number.hi) / k)
-    value = number.value / float(k)
-    value = value if low is None else max(value, low)
-    return Number(value=value if high is None else min(value, high), lo=low, hi=high, level=number.level)
+    return Number.within(number.value / float(k), low, high, number.level)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -325,8 +323,7 @@ def rest_of(factor: Number) -> Number:
     """1 minus a factor."""
     if factor.hi is None:
         return Number.of_float(1 - factor.value)
-    least = below(1 - Fraction(factor.hi))
-    return Number(value=max(1 - factor.value, least), lo=least, level=factor.level)
+    return Number.within(1 - factor.value, below(1 - Fraction(factor.hi)), None, factor.level)
 
 
 def bounded(results: Iterable[BoundResult]) -> str:

@@ -69,13 +69,6 @@ def _known(measured: Measured) -> list[str]:
     return [name for name in ALL_NAMES if getattr(measured, name) is not None]
 
 
-def _number(value: float, ends: Ends) -> Number:
-    """A number between bounds of which one at least is known."""
-    low, high = ends
-    value = value if low is None else max(value, low)
-    return Number(value=value if high is None else min(value, high), lo=low, hi=high, level="verified")
-
-
 def _join(ends: list[Ends], combine: Callable[[Any], float]) -> Ends:
     """Bounds of what grows with each of some numbers."""
     low, high = (None if any(end is None for end in side) else combine(side) for side in zip(*ends, strict=True))
@@ -122,7 +115,7 @@ class Proof:
     def _keep(self, name: str, ends: Ends) -> Ends:
         value = getattr(self.measured, name)
         if value is not None and value.level == "float" and ends != NOTHING:
-            self.numbers[name] = _number(value.value, ends)
+            self.numbers[name] = Number.within(value.value, *ends, "verified")
         return ends
 
     # --- m and M ------------------------------------------------------------------------------------------------------
@@ -142,7 +135,8 @@ class Proof:
                 own["m"] = ends["m"][name]
             self.progress(f"proving M of {name}", None)
             own["M"] = ends["M"][name] = enclose_largest((A, H), guess=plain.M.value, order=order)
-            kept = {key: _number(getattr(plain, key).value, both) for key, both in own.items() if both != NOTHING}
+            proved = {key: both for key, both in own.items() if both != NOTHING}
+            kept = {key: Number.within(getattr(plain, key).value, *both, "verified") for key, both in proved.items()}
             self.numbers[name] = replace(plain, m=kept.get("m", plain.m), M=kept.get("M", plain.M))
         self.m = {name: low for name, (low, _) in ends["m"].items()}
         self._keep("m", _join(list(ends["m"].values()), min))

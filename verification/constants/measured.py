@@ -267,7 +267,4 @@ def product(k: Fraction, a: Number, b: Number) -> Number:
     high = None if a.hi is None or b.hi is None else above(k * Fraction(a.hi) * Fraction(b.hi))
     if low is None and high is None:
         return Number.of_float(value)
-    value = value if low is None else max(value, low)
-    value = value if high is None else min(value, high)
-    level = weakest([a.level, b.level, "exact" if low == value == high else "verified"])
-    return Number(value=value, lo=low, hi=high, level=level)
+    return Number.within(value, low, high, weakest([a.level, b.level, "exact" if low == high else "verified"]))

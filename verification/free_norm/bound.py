@@ -223,7 +223,7 @@ def _verified(
                 found[name] = Number(value=proof.theta, lo=proof.theta, level="verified")
             else:
                 most = above(confirmation.factor(theta, proof.factor, proof.multipliers, norm(proof)))
-                found[name] = Number(value=min(proof.factor, most), hi=most, level="verified")
+                found[name] = Number.within(proof.factor, None, most, "verified")
         except NoCertificate as error:
             why[name] = str(error)
     if allowed is not None:

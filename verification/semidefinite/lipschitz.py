@@ -365,8 +365,7 @@ class Semidefinite(Part):
         why: dict[str, str] = {}
         for name, number in numbers.items():
             try:
-                least = below(proofs[name](number))
-                kept[name] = Number(value=max(number.value, least), lo=least, level="verified")
+                kept[name] = Number.within(number.value, below(proofs[name](number)), None, "verified")
             except (NoCertificate, LMIError) as error:
                 why[name] = str(error)
         beside = replace(self, **kept, unverified=why)
@@ -377,7 +376,7 @@ class Semidefinite(Part):
         most = above(found)
         if not most < 1:
             return replace(beside, not_proved=f"1 - {float(1 - found):.3g} is proved, which no double tells from 1")
-        number = Number(value=min(self.whole.value, most), hi=most, level="verified")
+        number = Number.within(self.whole.value, None, most, "verified")
         return replace(beside, lipschitz=number, divided=self.lipschitz, not_proved="")
 
 
