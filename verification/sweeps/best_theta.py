@@ -157,7 +157,7 @@ def best_theta(
         value = None
         try:
             value = None if why_not else work()
-        except (NotLinear, ContactError, SolveError, LMIError, ValueError) as error:
+        except (ContactError, SolveError, LMIError, ValueError) as error:
             why_not = str(error)
         if value is None:
             reason[name] = why_not or none

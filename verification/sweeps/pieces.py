@@ -19,7 +19,6 @@ from verification.algorithm.affine_piece import Piece, signs_of
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, at_solution
-from verification.algorithm.monolithic import SolveError
 from verification.algorithm.rates import Noise
 from verification.algorithm.start import Start, begin_at, compared_with
 from verification.constants import Measured
@@ -171,11 +170,11 @@ class KnownPieces:
     def _solution(self) -> Iterate | Exception:
         try:
             return at_solution(self.map())
-        except (NotLinear, SolveError, RuntimeError) as error:
+        except (NotLinear, RuntimeError) as error:
             return error
 
     def solution(self) -> Iterate:
-        """Return T at the solution of the global method; may raise NotLinear, SolveError or RuntimeError."""
+        """Return T at the solution of the global method; may raise NotLinear or RuntimeError."""
         if isinstance(self._solution, Exception):
             raise self._solution
         return self._solution
