@@ -34,6 +34,9 @@ REMEMBERED = 40
 #: A change of an earlier step in time counts if this share of it is independent of newer ones.
 FILTER = 1e-2
 
+#: A step of IQN-ILS below this share of its residual is none: no coupling of use has an eigenvalue as large.
+STILL = 1e-11
+
 #: Columns of the least-squares problem of Anderson mixing are dropped below this share of the largest.
 RANK = 1e-8
 
@@ -290,7 +293,12 @@ class InverseStep:
         if not known:
             return g + self.theta * (image - g)
         V, W = (np.column_stack(columns) for columns in zip(*known, strict=True))
-        return np.asarray(image - W @ np.linalg.lstsq(V, r, rcond=RANK)[0])
+        following = np.asarray(image - W @ np.linalg.lstsq(V, r, rcond=RANK)[0])
+        if np.linalg.norm(following - g) > STILL * np.linalg.norm(image - g):
+            return following
+        self.changes.clear()  # they are of other pieces of T: the rule would stay here for ever
+        self.earlier = ()
+        return g + self.theta * (image - g)
 
 
 def filtered(

@@ -19,7 +19,7 @@ from verification.algorithm.relaxation import InverseStep, Rule, rule_of
 from verification.coupling.advice import Advice
 from verification.coupling.kinds import kind_of
 from verification.coupling.spectrum import Spectrum
-from verification.coupling.vectors import seen_in
+from verification.coupling.vectors import last_piece, seen_in
 from verification.interface.matrices import real_array
 from verification.value import Value
 
@@ -111,6 +111,7 @@ class Coupling:
         self._following = self.rule.on_vectors(self.theta)
         self._scale: Floats | None = None
         self._seen: list[tuple[Floats, Floats, bool]] = []
+        self._changed = False  # whether contact did, between evaluations that are forgotten
         self._anew = True
         self._advice: Advice | None = None
 
@@ -183,8 +184,9 @@ class Coupling:
             self._scale = np.repeat(sizes, len(g) // 2)
         if len(self._seen) > REMEMBERED:
             left = FIRST_ONES if self.kind.linear else 0
-            begins = self._seen.pop(left)[2]
+            _, before, begins = self._seen.pop(left)
             x, Tx, anew = self._seen[left]
+            self._changed |= last_piece(np.array([before, Tx])) < 2
             self._seen[left] = x, Tx, anew or begins
         self._anew, self._advice = False, None
 
@@ -206,7 +208,7 @@ class Coupling:
         if self._advice is None and len(self._seen) > 1:
             X, TX, starts = map(np.array, zip(*self._seen, strict=True))
             try:
-                self._advice = Advice.of(seen_in(X, TX, kind=self.kind, starts=starts))
+                self._advice = Advice.of(seen_in(X, TX, kind=self.kind, starts=starts, changed=self._changed))
             except ValueError:  # they do not differ above rounding
                 return None
         return self._advice

@@ -129,10 +129,13 @@ class Evidence(Part, ABC):
         rows = methods.rows(spectrum, theta=theta, neumann_body=neumann_body, **{"exchanged": False} | settings)
         return tuple(row for row in rows if not (self.kind.parallel and row.method == "aitken"))
 
-    def on_estimates(self, spectrum: Spectrum, of: str) -> tuple[MethodRow, ...]:
-        """The methods on an estimated spectrum, in which open nodes are already, and with the roles exchanged."""
+    def on_estimates(self, spectrum: Spectrum, of: str, *, low_found: bool = True) -> tuple[MethodRow, ...]:
+        """The methods on an estimated spectrum, in which open nodes are already, and with the roles exchanged.
+
+        These have one over the least eigenvalue as their largest: it must be found.
+        """
         rows = self.in_role(self.estimated(spectrum, of), tied=True, exchanged=False)
-        if spectrum.low - spectrum.error_low > 0:
+        if low_found and spectrum.low - spectrum.error_low > 0:
             rows += self.in_role(self.estimated(spectrum.exchanged(), of), tied=True, exchanged=True)
         return rows
 

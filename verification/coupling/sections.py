@@ -288,12 +288,12 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     else:
         theta, rate = found.chosen(found.best)
         formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
-        formula = "2/(2 + 0 + largest), 0 for open nodes," if seen.seen.low < spectrum.low else formula
+        formula = "2/(2 + 0 + largest), with 0 for open nodes" if seen.seen.low < spectrum.low else formula
         if found.coupling.parallel:
             formula = "1/(1 + largest)" if spectrum.low >= 0 else "the theta of least factor over both square roots"
         notes = [
             "Ritz values: eigenvalues as these vectors show them, from inside; errors are estimates, for a linear T.",
-            f"theta = {theta:.4g} = {formula}, with both errors: factor {near_one(rate)} a step",
+            f"theta = {theta:.4g} = {formula}, and both errors: factor {near_one(rate)} a step",
         ]
     if spectrum.low + spectrum.error_low < 0 and not found.coupling.signed:
         notes.append("An eigenvalue between -1 and 0 is positive feedback; a theta above 1 is no mistake there.")

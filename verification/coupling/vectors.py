@@ -142,7 +142,7 @@ class Vectors(Evidence, Value):
         one over the least of these roles; their least one may be any down to 0.
         """
         if not roles or self.high_found:
-            return self.on_estimates(self.seen, "vectors") if roles else ()
+            return self.on_estimates(self.seen, "vectors", low_found=self.low_found) if roles else ()
         if not self.low_found or self.seen.low - self.seen.error_low <= 0:
             return ()
         role = self.estimated(self.seen.exchanged().with_open_nodes(), "vectors")
@@ -190,7 +190,9 @@ class Vectors(Evidence, Value):
         return f"{said}: with -1 or less no theta above 0 converges" if least <= RANK - 1 else ""
 
 
-def seen_in(X: Floats, TX: Floats, *, kind: Kind = CONTACT, starts: NDArray[np.bool_] | None = None) -> Vectors:
+def seen_in(
+    X: Floats, TX: Floats, *, kind: Kind = CONTACT, starts: NDArray[np.bool_] | None = None, changed: bool = False
+) -> Vectors:
     """The spectrum by Ritz values: iterates x and their images T x as rows, of a run by any method.
 
     With an orthonormal basis U of the differences of the iterates, the eigenvalues of ``U' (1 + H) U`` lie between the
@@ -207,13 +209,15 @@ def seen_in(X: Floats, TX: Floats, *, kind: Kind = CONTACT, starts: NDArray[np.b
         Of contact an image that is 0 shows an open node.
     starts : array of bool, shape (k,), optional
         Where another step in time begins, with another T of the same linear part.
+    changed : bool
+        Whether nodes opened or closed before these iterates.
 
     Raises
     ------
     ValueError
         The iterates, or their residuals, do not differ above rounding.
     """
-    given, last = len(X), len(X) if kind.linear else _last_piece(TX)
+    given, last = len(X), len(X) if kind.linear else last_piece(TX)
     changing, read = last < given, last if last >= FEWEST else given
     X, TX = X[-read:], TX[-read:]
     inside = np.ones(read - 1, dtype=bool) if starts is None else ~starts[-read + 1 :]
@@ -239,7 +243,7 @@ def seen_in(X: Floats, TX: Floats, *, kind: Kind = CONTACT, starts: NDArray[np.b
         directions=len(values),
         spectrum=spectrum,
         symmetric=spectrum.real,
-        changing=changing or (negative and not kind.linear),
+        changing=changing or ((changed or negative) and not kind.linear),
         settled=not changing or last >= FEWEST,
         ritz=values - 1,
         noise=noise,
@@ -366,7 +370,7 @@ def _apart(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> float | None:
     return max(shares, default=None)
 
 
-def _last_piece(TX: Floats) -> int:
+def last_piece(TX: Floats) -> int:
     """Number of the last images with the same entries 0."""
     zero = np.abs(TX) <= OPEN * float(np.abs(TX).max(initial=0.0))
     same = (zero == zero[-1]).all(axis=1)

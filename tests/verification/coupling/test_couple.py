@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -244,3 +245,42 @@ def test_a_wrong_sign_is_told_where_the_end_is_printed():
         "but all eigenvalues seem to be negative, which these make: contact that changes, solvers with noise"
         in found.summary
     )
+
+
+def over_springs(n, k, load, gap):
+    """A cantilever under a load over one-sided springs: most of them are open at first, and all when it swings back."""
+    x = np.arange(1, n + 1) / n
+    near, far = np.minimum.outer(x, x), np.maximum.outer(x, x)
+    bends = near**2 * (3 * far - near) / 6 + 1e-3 * np.eye(n)
+    return lambda g: bends @ g + load * x**2, lambda u: -k * np.maximum(0, u - gap * (1 - 2.5 * np.sin(3 * x)))
+
+
+@pytest.mark.parametrize(
+    ("n", "k", "load", "most"), [(10, 3, 0.2, 12), (20, 3, 0.1, 55), (30, 1.4, 0.2, 14), (30, 3, 0.2, 14)]
+)
+def test_iqn_ils_evaluates_no_force_twice_where_all_springs_open(n, k, load, most):
+    """A model of other pieces of T may have its solution at the last force: without a new start the first takes 27
+    evaluations, the second more than 300."""
+    beam, springs = over_springs(n, k, load, 0.02)
+    forces = []
+    found = vf.couple(lambda g: (forces.append(g.copy()), beam(g))[1], springs, start=np.zeros(n))
+    assert found.converged
+    assert found.iterations <= most
+    for before, after in pairwise(forces[1:]):
+        assert np.linalg.norm(after - before) > 1e-10 * np.linalg.norm(before)
+
+
+def test_contact_that_changed_before_the_remembered_evaluations_is_remembered_as_such():
+    """The springs are the same for the last twenty evaluations; IQN-ILS is still not advised as for tied bodies."""
+    beam, springs = over_springs(30, 1.4, 0.2, 0.02)
+    images = []
+    answer = lambda u: (images.append(springs(u)), images[-1])[1]
+    found = vf.couple(beam, answer, start=np.zeros(30), rule="constant", theta=0.4, tolerance=1e-9, max_iterations=200)
+    patterns = [tuple(image == 0) for image in images]
+    assert found.converged
+    assert len(set(patterns[-20:])) == 1 < len(set(patterns))
+    assert found.advice.vectors.changing
+    assert not found.advice.tied
+    assert found.advice.method.name == "aitken"
+    tied = vf.couple(beam, lambda u: -1.4 * u, start=np.zeros(30), rule="constant", theta=0.2, max_iterations=200)
+    assert not tied.advice.vectors.changing

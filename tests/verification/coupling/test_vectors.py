@@ -318,3 +318,18 @@ def test_vectors_in_any_unit_show_the_same_spectrum(unit):
     one, two = (vf.advise_vectors(X * size, image * size) for size in (1.0, unit))
     assert two.spectrum.low == pytest.approx(one.spectrum.low)
     assert two.spectrum.high == pytest.approx(one.spectrum.high)
+
+
+def test_exchanged_roles_are_advised_only_where_the_least_eigenvalue_is_found():
+    """Six iterates of a stiff coupling show the largest eigenvalue and not the least: one over it would be far off."""
+    stiff = Linear(np.logspace(-3, np.log10(200), 40))
+    X, TX = stiff.run("constant", 2 / (2 + 200), 6)
+    found = vf.advise_vectors(X, TX, kind="tied")
+    assert found.vectors.high_found
+    assert not found.vectors.low_found
+    assert found.methods
+    assert not any(row.exchanged for row in found.methods)
+    few = Linear([0.5, 2.0, 9.0])
+    whole = vf.advise_vectors(*few.run("constant", 0.15, 6), kind="tied")
+    assert whole.vectors.low_found
+    assert any(row.exchanged for row in whole.methods)
