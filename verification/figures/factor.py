@@ -49,7 +49,7 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
 def draw_proved(found: Comparison) -> Figure:
     """The factor of one step over theta by each bound that a comparison worked out, beside the prediction from rho.
 
-    The free norm is another norm than that of the other curves, and the run's rate is seen in the long run.
+    The free norm is not the norm of the other curves, and the rate of the run is one of many steps.
     """
     thetas = np.linspace(0.05, 0.95, PROVED)
     subject, rho = Subject.of(found.run.pair, found.measured), found.measured.rho_max
