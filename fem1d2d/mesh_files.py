@@ -17,6 +17,7 @@ import numpy as np
 
 from fem1d2d import mesh_reader
 from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, edges, measures, undirected
+from fem1d2d.trace import SAME
 
 #: Limits of the process that reads: seconds of processor time and bytes of memory, at least and for each byte of the
 #: file up to MOST_BYTES.  Half a million triangles in 36 MB take 5 s and 0.3 GB.
@@ -99,7 +100,7 @@ def _check_kind(path: Path) -> None:
         ending = f"the ending {path.suffix!r}" if path.suffix else "no ending"
         raise MeshError(
             f"needed a Gmsh file (.msh) or an Abaqus file (.inp), this one has {ending};"
-            " `meshio convert FILE out.msh` writes a Gmsh file"
+            " `meshio convert -o gmsh22 FILE out.msh` writes a Gmsh file"
         )
 
 
@@ -203,7 +204,7 @@ def _plane_mesh(read: Read) -> Mesh:
     points = points[used]
     if not np.isfinite(points).all():
         raise MeshError("a coordinate is not finite")
-    if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
+    if points.shape[1] == 3 and np.ptp(points[:, 2]) > SAME * np.ptp(points, axis=0).max():
         raise MeshError("the points do not lie in a plane z = constant")
     points, triangles = points[:, :2], number[triangles]
     with np.errstate(over="ignore", invalid="ignore"):  # coordinates too large for their products are refused later

@@ -200,7 +200,7 @@ def test_an_unreadable_mesh_is_refused_by_name(call, write, tmp_path, name, cont
             'VARIABLES = "X" "Y"\nZONE N=3,E=1,F=FEPOINT,ET=TRIANGLE\n0 0\n1 0\n',
             ["(.msh)", "(.inp)", "convert"],
         ),
-        ("body.e", "CDF", ["(.msh)", "(.inp)", "meshio convert FILE out.msh"]),
+        ("body.e", "CDF", ["(.msh)", "(.inp)", "meshio convert -o gmsh22 FILE out.msh"]),
         ("body.inp", "*INCLUDE, INPUT=/dev/zero\n", ["it includes another file"]),
         ("body.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1000000000\n", ["more than 1 GB of memory"]),
         ("body.inp", "*NODE\n1,0,0\n*ELSET, ELSET=a, GENERATE\n1, 2000000000, 1\n", ["more than 1 GB of memory"]),

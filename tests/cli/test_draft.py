@@ -289,7 +289,7 @@ def test_curved_sides_of_two_files_are_joined_along_their_line(tmp_path):
     for body in ("body1", "body2"):
         data[body] |= {"young": "2.1e5", "poisson": 0}
     data["body2"]["prescribed"], data["contact"]["friction"] = {"top": [0, "-0.01"]}, 0
-    data["iteration"]["neumann_body"] = 2
+    data["iteration"]["neumann_body"] = tomllib.loads(found.toml)["iteration"]["neumann_body"]
     straight = vf.solve(vf.Problem.from_dict(data))
     assert solution.contact.force["normal"] == pytest.approx(straight.contact.force["normal"], rel=1e-9)
 
@@ -411,3 +411,20 @@ def test_two_rectangles_of_any_size_and_direction_are_two_springs(tmp_path, widt
     )
     pressed = np.linalg.norm([float(v) for v in next(iter(moved))])
     assert solution.contact.force["normal"] == pytest.approx(2.1e5 * width * pressed / sum(heights), rel=0.02)
+
+
+@pytest.mark.parametrize(("cells", "neumann"), [(((8, 2), (3, 2)), 2), (((3, 2), (8, 2)), 1)])
+def test_the_body_with_the_finer_side_gets_the_contact_grid(cells, neumann, tmp_path):
+    blocks = [block((0, 1), (i - 1, i), named("ab"[i]), cells=cells[i]) for i in (0, 1)]
+    found = draft(gmsh(tmp_path / "both.msh", blocks, ["low", "high"]))
+    assert tomllib.loads(found.toml)["iteration"]["neumann_body"] == neumann
+    assert found.choices[-4] == "plane: strain is written, as thick bodies"
+
+
+def test_the_radius_follows_the_edges_where_the_bodies_are_nearest(tmp_path):
+    """Edges that grow away from the middle, where a bent side touches: the longest is 0.44, in the middle 0.06."""
+    blocks = [block((-1, 1), (-1, 0), named("a"), cells=(8, 2)), block((-1, 1), (0, 1), named("b"), (8, 2), lift=0.1)]
+    for points, *_ in blocks:
+        points[:, 0] = np.sign(points[:, 0]) * points[:, 0] ** 2
+    found = draft(gmsh(tmp_path / "both.msh", blocks, ["low", "high"]))
+    assert 0.06 < tomllib.loads(found.toml)["contact"]["radius"] < 0.25

@@ -177,7 +177,10 @@ def test_a_file_with_another_ending_is_refused_unread_with_a_way_to_convert_it(t
     path = tmp_path / f"body{ending}"
     path.write_bytes(b"")
     found = f"the ending '{path.suffix}'" if ending else "no ending"
-    refused(path, f"needed a Gmsh file .* or an Abaqus file .*, this one has {found}; `meshio convert FILE out.msh`")
+    refused(
+        path,
+        f"needed a Gmsh file .* or an Abaqus file .*, this one has {found}; `meshio convert -o gmsh22 FILE out.msh`",
+    )
 
 
 def test_a_file_of_fluent_is_no_gmsh_file_in_spite_of_its_ending(tmp_path):

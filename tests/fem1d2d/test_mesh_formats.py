@@ -1,8 +1,12 @@
 """Mesh files: materials, sections that promise too much, includes, and the variants of the formats."""
 
 import struct
+import subprocess
+import sys
+from pathlib import Path
 
 import meshio
+import numpy as np
 import pytest
 from mesh_writer import GMSH41, LINE, MSH, SQUARE, lines_of, read_here, refused
 
@@ -230,3 +234,29 @@ def test_a_node_number_of_format_4_0_below_one_is_no_node_counted_from_the_end(t
     text = GMSH40.replace("1 0 0 0 1 1 0 0 0", "1 0 0 0 1 1 0 1 8 0").replace("3 1 3 4\n", "3 1 3 -1\n")
     (tmp_path / "body.msh").write_text(text)
     refused(tmp_path / "body.msh", "an element names node -1: nodes are numbered from 1")
+
+
+# --- what other programs write ---
+
+
+def test_points_of_one_plane_up_to_rounding_are_in_it(tmp_path):
+    square = SQUARE + np.array([[0, 0, 0], [0, 0, 1e-17], [0, 0, -3e-12], [0, 0, 0]])
+    for tilt, fits in ((0.0, True), (1e-6, False)):
+        points = square + tilt * square[:, :1] * [0, 0, 1]
+        cells = [("line", [[0, 1]]), ("triangle", [[0, 1, 2], [0, 2, 3]])]
+        data = {"gmsh:physical": [[1], [9, 9]], "gmsh:geometrical": [[1], [9, 9]]}
+        mesh = meshio.Mesh(points, cells, cell_data=data, field_data={"bottom": [1, 1], "body": [9, 2]})
+        meshio.write(tmp_path / "flat.msh", mesh, file_format="gmsh22", binary=False)
+        if fits:
+            assert len(from_file(tmp_path / "flat.msh").points) == 4
+        else:
+            refused(tmp_path / "flat.msh", "the points do not lie in a plane")
+
+
+def test_the_command_that_a_refusal_names_writes_a_gmsh_file(tmp_path):
+    """The ending .msh alone is that of another format to meshio."""
+    meshio.write(tmp_path / "in.vtk", meshio.Mesh(SQUARE, [("triangle", [[0, 1, 2], [0, 2, 3]])]))
+    command = [Path(sys.executable).with_name("meshio"), "convert", "-o", "gmsh22", "in.vtk", "out.msh"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "out.msh").read_bytes().startswith(b"$MeshFormat")
+    refused(tmp_path / "out.msh", "no named lines")

@@ -35,7 +35,7 @@ from verification.contact import ContactError, Solver
 from verification.contact.active_set import Systems
 from verification.document import Document
 from verification.interface.assembly import TwoBodies, discretise
-from verification.interface.fields import ContactFields
+from verification.interface.fields import GROWN, ContactFields
 from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair, pair_from
 from verification.interface.values import ASKED, PointValue, columns_of, values_on_sides
@@ -290,7 +290,8 @@ class History(Document):
         length = self.units["length"]
         apart = [line for each in self.increments for line in each.contact.warnings(length)]  # most part, or meet later
         nearest = min(self.increments, key=lambda one: float(one.contact.gap.min()))
-        return [line for line in lines if line not in apart] + nearest.contact.warnings(length)
+        steps = [line for line in lines if line not in apart and not (len(self.increments) > 1 and GROWN in line)]
+        return steps + nearest.contact.warnings(length)
 
     @cached_property
     def fields(self) -> Mapping[str, Floats]:

@@ -120,7 +120,8 @@ class Solution(Document):
     @says()
     def warnings(self) -> list[str]:
         """Facts to know before trusting the numbers."""
-        return [*self.bodies.warnings, *self.contact.warnings(self.units["length"]), *self.checks.warnings]
+        grown = self.contact.grown(self.bodies.interface, float(self.bodies.friction))
+        return [*self.bodies.warnings, *grown, *self.contact.warnings(self.units["length"]), *self.checks.warnings]
 
     def plot(self, **options: Any) -> Figure:
         """Draw the deformed bodies above pressure, shear, friction bound and states along Gamma_c.

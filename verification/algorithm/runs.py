@@ -393,7 +393,8 @@ class Run(Document):
     def warnings(self) -> list[str]:
         """Facts to know before trusting the numbers."""
         tied = [self.start.why] if self.start.source == "tied" else []
-        state = [*self.contact.warnings(self.units["length"]), *self.checks.warnings] if self.converged else []
+        grown = self.contact.grown(self.pair.interface, float(self.pair.friction))
+        state = [*grown, *self.contact.warnings(self.units["length"]), *self.checks.warnings] if self.converged else []
         return self.pair.warnings + self.choice.warnings + tied + state
 
     def plot(self, view: str = "residuals", **options: Any) -> Figure:

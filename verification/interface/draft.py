@@ -84,7 +84,13 @@ def draft(*paths: Path) -> Draft:
     neumann = "" if several else f"neumann_body = {1 if contacts and contacts[0].contact == 2 else 2}\n"
     parts = [HEAD.format(title=title, plane=plane), *(seat.table for seat in seats), "".join(notes)]
     parts += [*(tables if tables or several else [FLAT]), f'[iteration]\n{neumann}theta = "auto"\n']
-    choices = (*missing, *(f"body {seat.number}: {seat.proposal[1]}" for seat in seats), *ALWAYS)
+    as_file = "the elements of the file are made for it" if any(body.planes for body in bodies) else "thick bodies"
+    choices = (
+        *missing,
+        *(f"body {seat.number}: {seat.proposal[1]}" for seat in seats),
+        f"plane: {plane} is written, as {as_file}",
+        *ALWAYS,
+    )
     return Draft(toml="\n".join(filter(None, parts)), bodies=bodies, contacts=tuple(contacts), choices=choices)
 
 

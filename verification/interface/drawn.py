@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fem1d2d import Line, Mesh, MeshError, mesh_files, pieces
 from fem1d2d.mesh import Cells, Floats, Ints, measures, undirected
+from fem1d2d.trace import SAME
 from ndtheory.keys import Part, key, says
 from verification.interface.joining import MOST_OVERLAP, facing_parts
 from verification.problem.colours import OddRing, colours
@@ -68,6 +69,12 @@ class Drawn(Part):
         return found
 
 
+def _width(s: Floats, at: float) -> float:
+    """The longest edge of a line beside a position."""
+    near = int(np.argmin(np.abs(s - at)))
+    return float(np.abs(np.diff(s[max(near - 1, 0) : near + 2])).max())
+
+
 def bodies_of(path: Path, *, one: bool) -> list[Drawn]:
     """Find the bodies of a mesh file: its pieces, or all of it where they are ``one`` body.
 
@@ -114,7 +121,8 @@ def _surfaces(surfaces: Mapping[str, Ints], free: NDArray[np.bool_]) -> tuple[tu
 class Touch(Part):
     """Two lines that may touch; ``normal`` is the mean one, from the first body to the second.
 
-    ``nodes`` has the nodes of each body there, ``length`` is the length of the contact, ``width`` its longest edge.
+    ``nodes`` has the nodes of each body there, ``length`` is the length of the contact, ``width`` its longest edge
+    where the bodies are nearest.
     """
 
     bodies: tuple[int, int] = key("numbers of two bodies")
@@ -168,12 +176,20 @@ def _facing(bodies: Sequence[Drawn], pair: tuple[int, int]) -> Iterator[Touch]:
         boxes = [np.concatenate([line.points for line in of]) for of in lines]
         (low, high), (bottom, top) = ((points.min(axis=0), points.max(axis=0)) for points in boxes)
         apart = np.maximum(low, bottom) - np.minimum(high, top)
-        for contact in (1, 2) if np.linalg.norm(np.maximum(apart, 0.0)) <= NEAR * size else ():
+        near = np.linalg.norm(np.maximum(apart, 0.0)) <= NEAR * size
+        order = _finer_first(lines) if len(bodies) == 2 else (1, 2)  # of more the colours give the roles
+        for contact in order if near else ():
             with suppress(MeshError):
                 touch = _touch(pair, surface, lines, contact, NEAR * size)
                 if -MOST_OVERLAP * size <= touch.gap <= NEAR * size:
                     yield touch
                     break
+
+
+def _finer_first(lines: tuple[list[Line], list[Line]]) -> tuple[int, int]:
+    """Return 1 and 2, first the body whose edges along the contact are shorter: it gets the contact grid."""
+    one, other = (float(np.median(np.concatenate([np.diff(line.s) for line in of]))) for of in lines)
+    return (1, 2) if one <= other * (1 + SAME) else (2, 1)
 
 
 def _touch(
@@ -183,6 +199,7 @@ def _touch(
     step = 1 if contact == 1 else -1
     line, _, other = facing_parts(lines[contact - 1], lines[2 - contact], surface[contact - 1], reach)
     seen = line.seen_from(other)
+    nearest = line.s[int(np.argmin(step * seen.gap))]
     nodes = line.nodes, other.nodes[seen.reaches]
     return Touch(
         bodies=pair,
@@ -192,5 +209,5 @@ def _touch(
         normal=line.normals.mean(axis=0),
         nodes=nodes if contact == 1 else (nodes[1], nodes[0]),
         length=float(line.s[-1]),
-        width=max(float(np.diff(each.s).max()) for each in (line, other)),
+        width=max(_width(line.s, nearest), _width(seen.s, nearest)),
     )

@@ -8,12 +8,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fem1d2d.mesh import Floats, Ints
+from fem1d2d.trace import SAME
 from ndtheory.keys import ABSENT, Key, Part, document, key, says
 from verification.contact.active_set import Pattern
 from verification.interface.interface import Interface, Stretch
 from verification.value import Value, copied, lent
 
 STATES = ("stick", "slip", "open")
+
+#: What a static solution does to friction at nodes that come into contact on the way.
+GROWN = (
+    "that were apart touch with friction: slip counts from the drawn state, before they touched, so that their shear is"
+    " not the one of a load that grows; `ndtheory march` with [[step]] tables follows it"
+)
 
 #: Keys of the total forces of all contacts, and of each of several.
 OF_FORCE = Key(
@@ -163,6 +170,14 @@ class ContactFields(Value, Part):
     def apart(self) -> bool:
         """True if nothing touches."""
         return set(self.status) == {"open"}
+
+    def grown(self, interface: Interface, k: float) -> list[str]:
+        """Return a warning where nodes that were apart touch with friction: their shear depends on the way there."""
+        apart = interface.gap > SAME * np.ptp(interface.contact.x)
+        met = apart & (np.array(self.status) != "open")
+        if not (k and met.any()) or interface.law is None or interface.slipped.any():
+            return []
+        return [f"{int(met.sum())} nodes {GROWN}"]
 
     def warnings(self, length: str) -> list[str]:
         """Return a warning where nothing touches, with the unit of length."""

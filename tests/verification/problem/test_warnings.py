@@ -383,3 +383,33 @@ def test_a_bound_of_the_local_law_is_warned_of_beyond_a_tenth_and_at_closed_node
     assert of(np.where(np.arange(len(ones)) == 3, 1.2, 0.8)) == [said]
     pressure[:] = 0.0
     assert of(ones) == []
+
+
+# --- contact that grows under friction --------------------------------------------------------------------------------
+
+
+def on_a_wheel(friction="0.1", *, steps=0):
+    """A block that is pressed up against a wheel: one node touches at first, then others."""
+    body = {"shape": "rectangle", "x": [-2, 2], "y": [-2, 0], "cells": [40, 10], "young": 1000, "poisson": "0.3"}
+    loads = {"prescribed": {"bottom": ["0.001", "0.02"]}}
+    wheel = {"shape": "rigid", "side": "wheel", "circle": {"centre": [0, 3], "radius": 3, "arc": [240, 300]}}
+    contact = {"surface": ["top", "wheel"], "friction": friction, "law": "local"}
+    step = {"step": [{"increments": steps, "body1": loads}]} if steps else {}
+    return vf.Problem.from_dict({"body1": body | loads, "body2": wheel, "contact": contact, **step})
+
+
+def test_a_static_solution_warns_of_friction_where_nodes_come_into_contact():
+    warned = [line for line in vf.solve(on_a_wheel()).warnings if "that were apart touch with friction" in line]
+    assert len(warned) == 1
+    assert re.match(r"\d+ nodes that were apart", warned[0])
+    assert any("that were apart" in line for line in vf.run(on_a_wheel()).warnings)
+    assert not any("that were apart" in line for line in vf.solve(on_a_wheel("0")).warnings)
+    assert not any("that were apart" in line for line in vf.solve(vf.Problem.from_dict(plates())).warnings)
+
+
+def test_a_history_in_one_increment_warns_and_one_in_many_has_another_shear():
+    one, many = (vf.march(on_a_wheel("0.3", steps=count), method="monolithic") for count in (1, 20))
+    assert any("that were apart" in line for line in one.warnings)
+    assert not any("that were apart" in line for line in many.warnings)
+    shear = [abs(found.increments[-1].contact.shear).sum() for found in (one, many)]
+    assert shear[1] < 0.9 * shear[0]
