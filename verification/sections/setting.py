@@ -15,7 +15,7 @@ def setting(problem: Problem, nodes: int | None, interface: int, cuts: Iterable[
     """A problem, on so many nodes of both bodies and of Gamma_c, and what cells of their files were cut."""
     units, contact = problem.units, problem.contact
     counts = [] if nodes is None else [f"{nodes} nodes, {interface} on Gamma_c"]
-    counts += [f"triangles cut from {cut}" for cut in cuts if cut]
+    counts += [f"triangles cut from {cut}" for cut in dict.fromkeys(cuts) if cut]
     bodies = problem.bodies.values()
     moduli = " / ".join("rigid" if one.rigid else " to ".join(f"{float(E):g}" for E in one.youngs) for one in bodies)
     body = problem.iteration.neumann_body

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_writer import write_gmsh22
+from mesh_writer import write_curved, write_gmsh22
 from problem_list import SHEARED, changed, plates
 
 import verification as vf
@@ -413,3 +413,21 @@ def test_a_history_in_one_increment_warns_and_one_in_many_has_another_shear():
     assert not any("that were apart" in line for line in many.warnings)
     shear = [abs(found.increments[-1].contact.shear).sum() for found in (one, many)]
     assert shear[1] < 0.9 * shear[0]
+
+
+# --- the grid of the coarser body -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("neumann", "warns"), [(1, False), (2, True)])
+def test_a_contact_grid_much_coarser_than_the_other_one_is_warned_of_where_bodies_are_curved(neumann, warns, tmp_path):
+    """A round body on fine cells over a block on coarse ones, in both roles; flat bodies may be coarse."""
+    x = np.linspace(-0.2, 0.2, 41)
+    round_one = {"mesh": write_curved(tmp_path / "high.msh", x, lambda x: 1 - np.sqrt(1 - x**2), lambda x: 0 * x + 0.2)}
+    moduli = {"young": 1000, "poisson": "0.3"}
+    low = {"shape": "rectangle", "x": ["-0.2", "0.2"], "y": ["-0.2", 0], "cells": [4, 2], "fixed": ["bottom"], **moduli}
+    data = {"body1": low, "body2": round_one | moduli | {"prescribed": {"top": [0, "-0.001"]}}}
+    data |= {"contact": {"surface": ["top", "bottom"]}, "iteration": {"neumann_body": neumann}}
+    found = warned(data)
+    assert any("10 times as long as those of the other grid" in line for line in found) == warns
+    flat = plates(body2={"cells": [60, 3]}, iteration={"neumann_body": 2, "theta": "0.5"})
+    assert not any("as long as" in line for line in warned(flat))
