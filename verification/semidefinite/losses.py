@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import count, pairwise
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigvalsh
@@ -56,24 +57,35 @@ class Suprema:
 EXACT = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")
 
 
-def quotients(m: float, M: float, C_R: float, of: Suprema) -> tuple[float, ...]:
+def quotients(
+    m: Any,
+    M: Any,
+    C_R: Any,
+    reaction: Any,
+    energy: Any,
+    force: Any,
+    displacement: Any,
+    displacement_dual: Any,
+    force_dual: Any,
+) -> tuple[Any, ...]:
     """Squares of right over left side of the inequalities :data:`EXACT` at their worst pairs; of (5.29) the quotient.
 
-    The last one is for (5.19) as a step of a chain, after the largest displacement.
+    The last one is for (5.19) as a step of a chain, after the largest displacement.  Arguments of any number type, the
+    last six as in :class:`Suprema`.
 
     Examples
     --------
-    >>> quotients(1, 2, 3, Suprema(reaction=4, energy=5, force=6, displacement=7, displacement_dual=8, force_dual=9))[0]
+    >>> quotients(1, 2, 3, 4, 5, 6, 7, 8, 9)[0]
     9.0
     """
     a = M * C_R
     return (
-        a * a / of.reaction,
-        1 / (m * m * of.displacement_dual),
-        1 / (m * of.force_dual),
-        M * M / (m * of.force),
-        a * a / (m * m * of.energy),
-        of.force / (m * m * of.displacement),
+        a * a / reaction,
+        1 / (m * m * displacement_dual),
+        1 / (m * force_dual),
+        M * M / (m * force),
+        a * a / (m * m * energy),
+        force / (m * m * displacement),
     )
 
 
@@ -160,7 +172,7 @@ def locate(pair: ContactPair, measured: Measured, *, progress: Progress = silent
     half = lambda right, left: decades(right * right, left) / 2
     P = lambda edition: formulas.P(x, edition.coercivity(m), M, C_R, edition.unit(m))
     C_T = formulas.lipschitz(m, M, C_R, x)
-    exact = zip(EXACT, map(math.log10, quotients(m, M, C_R, eigen)), strict=False)
+    exact = zip(EXACT, map(math.log10, quotients(m, M, C_R, **vars(eigen))), strict=False)
     links = [
         Loss(label="(5.11)", decades=half(X, ratio), searched=True),
         Loss(label="(5.16)", decades=half(C_T, T_dual), searched=True),

@@ -13,7 +13,7 @@ from matplotlib.textpath import TextPath
 import verification as vf
 from ndtheory.statements import proof_of, statements
 from verification.figures.proof_map import BOX, CHAIN, LOOKS, PRINTED, STEPS, WIDTH, draw_map, width_of
-from verification.semidefinite.losses import EXACT, LossForms, locate, quotients, suprema
+from verification.semidefinite.losses import EXACT, LossForms, Suprema, locate, quotients, suprema
 
 SVG = "{http://www.w3.org/2000/svg}"
 MAPS = {"chain": {"ids": CHAIN, "grounds": False}, "all": {}, "one": {"ids": ["4.1"]}}
@@ -213,7 +213,7 @@ def test_without_losses_every_edge_is_thin():
 def test_quotients_are_the_losses_that_need_no_search(measured, losses):
     pair, found = measured
     constants = found.constants()
-    values = quotients(*(float(v) for v in (constants.m, constants.M, constants.C_R)), suprema(LossForms(pair)))
+    values = quotients(*(float(v) for v in (constants.m, constants.M, constants.C_R)), **vars(suprema(LossForms(pair))))
     links = {loss.label: loss.decades for loss in losses.links if not loss.searched}
     assert set(links) == set(EXACT)
     for label, value in zip(EXACT, values, strict=False):
@@ -222,3 +222,4 @@ def test_quotients_are_the_losses_that_need_no_search(measured, losses):
     for chain, part in ((losses.friction, 1), (losses.lipschitz, 0.5)):
         exact = {loss.label: loss.decades for loss in chain if not loss.searched and not loss.only_unit}
         assert exact == pytest.approx({label: part * value for label, value in steps.items()}, rel=1e-9)
+    assert tuple(Suprema.__annotations__) == tuple(quotients.__annotations__)[3:-1]
