@@ -9,6 +9,7 @@ import meshio
 import numpy as np
 import pytest
 from mesh_writer import GMSH41, LINE, MSH, SQUARE, lines_of, read_here, refused
+from processes import environment
 
 from fem1d2d import from_file, mesh_files
 from fem1d2d.mesh import measures
@@ -257,6 +258,6 @@ def test_the_command_that_a_refusal_names_writes_a_gmsh_file(tmp_path):
     """The ending .msh alone is that of another format to meshio."""
     meshio.write(tmp_path / "in.vtk", meshio.Mesh(SQUARE, [("triangle", [[0, 1, 2], [0, 2, 3]])]))
     command = [Path(sys.executable).with_name("meshio"), "convert", "-o", "gmsh22", "in.vtk", "out.msh"]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, env=environment())
     assert (tmp_path / "out.msh").read_bytes().startswith(b"$MeshFormat")
     refused(tmp_path / "out.msh", "no named lines")

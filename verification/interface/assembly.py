@@ -62,7 +62,7 @@ PRESSURE_ERRORS = {
 #: The smaller extent of a body over the larger one, at least: places within 1e-9 of the larger one count as the same.
 SLENDEREST = 1e-7
 
-#: From this ratio of the edges of the contact grid to those of the other one on a warning is given where bodies are
+#: From this ratio of the edges of the contact grid to the edges opposite on a warning is given where bodies are
 #: curved: with 210 a single node was closed, and the largest pressure was a fifth of the right one.
 COARSE = 4.0
 
@@ -307,7 +307,7 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
     ):
         found.append(
             f"where the bodies are nearest the edges of the contact grid are {own / other:.2g} times as long as"
-            " those of the other grid, which resolves the contact of curved bodies badly: give the coarser body the"
+            " the edges opposite, which resolves the contact of curved bodies badly: give the coarser body the"
             " Neumann problem (iteration.neumann_body)"
         )
     if friction and interface.law is not None:

@@ -428,6 +428,6 @@ def test_a_contact_grid_much_coarser_than_the_other_one_is_warned_of_where_bodie
     data = {"body1": low, "body2": round_one | moduli | {"prescribed": {"top": [0, "-0.001"]}}}
     data |= {"contact": {"surface": ["top", "bottom"]}, "iteration": {"neumann_body": neumann}}
     found = warned(data)
-    assert any("10 times as long as those of the other grid" in line for line in found) == warns
+    assert any("10 times as long as the edges opposite" in line for line in found) == warns
     flat = plates(body2={"cells": [60, 3]}, iteration={"neumann_body": 2, "theta": "0.5"})
     assert not any("as long as" in line for line in warned(flat))
