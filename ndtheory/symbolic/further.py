@@ -6,6 +6,7 @@ what it is without friction: gradient descent.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import sympy as sp
@@ -750,20 +751,26 @@ check(
 )
 
 
-def _saw_tooth(form: Any) -> list[Goal]:
-    """The amplification of a saw-tooth of pressure: its image from below, its own norm from above."""
-    n, width, d, G, nu, zeta = sp.symbols("n h d G nu zeta", positive=True)
-    x = sp.Symbol("x", real=True)
+@cache
+def _waves() -> tuple[Any, ...]:
+    """h, m >= 0 and the coefficient of cos((2m+1) pi x/h) in a hat of base 2h and height 1."""
+    width, x = sp.Symbol("h", positive=True), sp.Symbol("x", real=True)
     j = sp.Symbol("m", integer=True, nonnegative=True)
     wave = (2 * j + 1) * sp.pi / width
-    hat = 2 * sp.integrate((1 - x / width) * sp.cos(wave * x), (x, 0, width))
+    return width, j, sp.simplify(2 * sp.integrate((1 - x / width) * sp.cos(wave * x), (x, 0, width)))
+
+
+def _saw_tooth(form: Any) -> list[Goal]:
+    """The amplification of a saw-tooth of pressure: its image from below, its own norm from above."""
+    n, d, G, nu, zeta = sp.symbols("n d G nu zeta", positive=True)
+    width, j, hat = _waves()
     E = 2 * G / (1 - nu)  # E^*
     odd = sp.Rational(7, 8) * zeta  # the sum of (2m+1)^-3
     first = sp.pi**2 / (4 * width * odd)  # c_0 from the sum of c_m 4h/(pi^2 (2m+1)^2) = 1, c_m = c_0/(2m+1)
     own = width / 2 * first**2 * 2 * width / (E * sp.pi) * odd  # for each node
     image = theta**2 * k**2 * n * d / (G * width)
     return [
-        equal(sp.simplify(hat), 4 * width / (sp.pi**2 * (2 * j + 1) ** 2)),
+        equal(hat, 4 * width / (sp.pi**2 * (2 * j + 1) ** 2)),
         equal(own, sp.pi**3 / (14 * zeta * E)),
         equal(image / (n * own), form(zeta) * theta**2 * k**2 * d / ((1 - nu) * width)),
     ]

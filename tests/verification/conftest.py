@@ -3,11 +3,9 @@
 from importlib.util import find_spec
 
 import pytest
-from mesh_writer import read_here
 from small_result import problem
 
 import verification as vf
-from fem1d2d import mesh_files
 from verification.output.folder import Folder
 from verification.sweeps import workers
 
@@ -26,12 +24,6 @@ def written(comparison, tmp_path_factory):
     folder = tmp_path_factory.mktemp("written")
     Folder(folder, "compare").write(comparison)
     return folder
-
-
-@pytest.fixture(autouse=True)
-def meshes_in_this_process(monkeypatch):
-    """No process for each mesh file, which costs a third of a second; those of the process lie elsewhere."""
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
 
 
 @pytest.fixture(autouse=True)
