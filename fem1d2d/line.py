@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, undirected
+from fem1d2d.mesh import Floats, Ints, Mesh, MeshError
 from fem1d2d.trace import SAME
 
 #: Pairs of an edge and a node that are computed together: arrays of some 10 MB.
@@ -84,8 +84,7 @@ class Line:
         away : array, shape (m, 2), optional
             Points far from which a closed line without a corner begins and ends.
         """
-        on_boundary, on_side = (undirected(edges, len(mesh.points)) for edges in (mesh.boundary, mesh.sides[side]))
-        edges, points = mesh.boundary[np.isin(on_boundary, on_side)], mesh.points.astype(float)
+        edges, points = mesh.along(side), mesh.points.astype(float)
         pieces = chains(edges if left else edges[:, ::-1])
         return [line for nodes in pieces for line in cls._cut(nodes, points, mirrored, away)]
 

@@ -151,6 +151,11 @@ class Mesh(Cells):
         whole: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self) if field.init}
         return partial(Mesh, **whole | {name: dict(whole[name]) for name in ("sides", "surfaces", "shares")}), ()
 
+    def along(self, side: str) -> Ints:
+        """Return the facets of a named side as the boundary has them, with the mesh on the left of an edge."""
+        on_boundary, on_side = (undirected(each, len(self.points)) for each in (self.boundary, self.sides[side]))
+        return self.boundary[np.isin(on_boundary, on_side)]
+
     @property
     def quadrilaterals(self) -> tuple[Ints, Ints]:
         """The four cells around each centre, and the corners of the quadrilateral that they are, each shape (q, 4).

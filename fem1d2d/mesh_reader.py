@@ -55,7 +55,7 @@ CUTS: dict[str, tuple[Sequence[Sequence[int]], Sequence[Sequence[float]]]] = {
     "quad9": _of_four(None),
 }
 
-#: Kinds of cells of a line, with its linear pieces; and kinds that are no part of the plane and are left out.
+#: Kinds of cells of a line, with its linear pieces; and kinds outside the plane, which are left out.
 PIECES = {"line": ((0, 1),), "line3": ((0, 2), (2, 1))}
 LEFT_OUT = {"vertex"}
 
@@ -108,7 +108,7 @@ def contents(path: Path) -> dict[str, Any]:
     dict
         ``points`` of shape (n, 2) or (n, 3), ``triangles`` of shape (c, 3), ``centres``, the points in the middle of
         quadrilaterals, ``lines`` of shape (l, 2) by their names, ``surfaces``, the numbers of their triangles by their
-        names, ``split``, why they are several materials, or ""; ``cut``, the cells that were no linear triangles, in
+        names, ``split``, why they are several materials, or ""; ``cut``, the cells of other kinds that were cut, in
         words; ``plane``, elements of Abaqus that are of plane strain or stress by these words.
 
     Raises

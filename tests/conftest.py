@@ -106,3 +106,11 @@ def known_bounds(monkeypatch, shared):
     for module, name in DEAR:
         monkeypatch.setattr(module, name, once(getattr(module, name), shared))
     monkeypatch.setattr(comparison, "by_cvxpy_alone", repeated_once(comparison.by_cvxpy_alone, shared))
+
+
+@pytest.fixture
+def meshes_read_here(monkeypatch):
+    """Mesh files are read in this process: those of most tests need no limits."""
+    from mesh_writer import read_here
+
+    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)

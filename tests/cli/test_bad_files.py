@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from complaints import assert_names
-from mesh_writer import read_here, write_gmsh22
+from mesh_writer import write_gmsh22
 
 from fem1d2d import rectangle
 from verification.coupling.matrix_files import read_matrix
@@ -158,12 +158,6 @@ def mesh_file(path, y=(-0.3, 0.0), names=("left", "right", "bottom", "top"), lif
     write_gmsh22(path, points, np.tile(mesh.cells, (2 if twice else 1, 1)), sides, surfaces)
 
 
-@pytest.fixture
-def read_at_once(monkeypatch):
-    """Files of meshes are read in this process: those of these tests need no limits."""
-    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)
-
-
 MESHED = {"body1.mesh": '"body1.msh"'} | dict.fromkeys(f"body1.{key}" for key in ("shape", "x", "y", "cells"))
 
 
@@ -214,7 +208,7 @@ def test_a_hostile_mesh_file_is_refused_within_its_limits(call, write, tmp_path,
     assert_names(line, "problem.toml", "body1.mesh", name, *fragments)
 
 
-@pytest.mark.usefixtures("read_at_once")
+@pytest.mark.usefixtures("meshes_read_here")
 def test_a_body_of_two_materials_is_refused_with_their_names(call, write, tmp_path):
     mesh_file(tmp_path / "body1.msh", surfaces=("rubber", "steel"))
     line = call("run", write(MESHED)).complaint
@@ -223,7 +217,7 @@ def test_a_body_of_two_materials_is_refused_with_their_names(call, write, tmp_pa
     assert call("run", write(MESHED)).status == 0
 
 
-@pytest.mark.usefixtures("read_at_once")
+@pytest.mark.usefixtures("meshes_read_here")
 @pytest.mark.parametrize(
     ("changes", "fragments"),
     [
@@ -238,7 +232,7 @@ def test_a_mesh_that_does_not_fit_is_refused_by_name(call, write, tmp_path, chan
     assert_names(call("run", write(MESHED)).complaint, "problem.toml", *fragments)
 
 
-@pytest.mark.usefixtures("read_at_once")
+@pytest.mark.usefixtures("meshes_read_here")
 def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measured(call, write, tmp_path, monkeypatch):
     mesh_file(tmp_path / "body1.msh")
     monkeypatch.setattr("verification.constants.measuring.largest_sparse", None)
@@ -246,7 +240,7 @@ def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measur
     assert_names(line, "problem.toml", "body1.mesh", "body1.msh", "halved")
 
 
-@pytest.mark.usefixtures("read_at_once")
+@pytest.mark.usefixtures("meshes_read_here")
 @pytest.mark.parametrize(
     ("command", "fault", "says"),
     [
@@ -269,7 +263,7 @@ def test_a_malformed_mesh_is_refused_by_its_fault(call, write, tmp_path, command
     assert "matching" not in line
 
 
-@pytest.mark.usefixtures("read_at_once")
+@pytest.mark.usefixtures("meshes_read_here")
 def test_a_mesh_with_every_cell_twice_is_refused_as_that(call, write, tmp_path):
     """Not for its grid on Gamma_c: no edge would be left on the boundary."""
     mesh_file(tmp_path / "body1.msh", twice=True)

@@ -10,17 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mesh_writer import read_here
 
 import verification as vf
-from fem1d2d import mesh_files
 from verification.interface.draft import draft
 
-
-@pytest.fixture(autouse=True)
-def no_process(monkeypatch):
-    """No process for each mesh file, which costs a third of a second."""
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+pytestmark = pytest.mark.usefixtures("meshes_read_here")
 
 
 MESHES = Path(__file__).parents[2] / "docs" / "meshes"

@@ -8,10 +8,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from mesh_writer import read_here
 
 import verification as vf
-from fem1d2d import mesh_files
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "gallery.md").read_text("utf-8")
@@ -58,10 +56,7 @@ MUTANTS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch):
-    """No process for each mesh file."""
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+pytestmark = pytest.mark.usefixtures("meshes_read_here")
 
 
 def allowed(name):

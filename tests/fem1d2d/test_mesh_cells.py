@@ -3,17 +3,15 @@
 import meshio
 import numpy as np
 import pytest
-from mesh_writer import read_here, refused
+from mesh_writer import refused
 
-from fem1d2d import Material, Mesh, from_file, mesh_files, stiffness
+from fem1d2d import Material, Mesh, from_file, stiffness
 from fem1d2d.mesh import crossed, measures
 
 NX, NY = 3, 2
 
 
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch):
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+pytestmark = pytest.mark.usefixtures("meshes_read_here")
 
 
 def grid(order):

@@ -12,18 +12,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mesh_writer import CELLS, GMSH41, LINE, MSH, SQUARE, lines_of, read_here, refused
+from mesh_writer import CELLS, GMSH41, LINE, MSH, SQUARE, lines_of, refused
 from strategies import fewer, in_floats, plane_meshes
 
-from fem1d2d import MeshError, from_file, gram, mesh_files, mesh_reader, rectangle, surface
+from fem1d2d import MeshError, from_file, gram, mesh_reader, rectangle, surface
 from fem1d2d.mesh import measures
 
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
 
 
-@pytest.fixture(autouse=True)
-def here(monkeypatch):
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+pytestmark = pytest.mark.usefixtures("meshes_read_here")
 
 
 def write(path, points, triangles, sides=None, *, more=(), binary=False):

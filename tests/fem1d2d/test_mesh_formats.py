@@ -8,16 +8,13 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from mesh_writer import GMSH41, LINE, MSH, SQUARE, lines_of, read_here, refused
+from mesh_writer import GMSH41, LINE, MSH, SQUARE, lines_of, refused
 from processes import environment
 
-from fem1d2d import from_file, mesh_files
+from fem1d2d import from_file
 from fem1d2d.mesh import measures
 
-
-@pytest.fixture(autouse=True)
-def here(monkeypatch):
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+pytestmark = pytest.mark.usefixtures("meshes_read_here")
 
 
 # --- one material ---

@@ -4,16 +4,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from mesh_writer import read_here, write_gmsh22
+from mesh_writer import write_gmsh22
 from problem_list import SECTION_6, bars, changed
 
 import verification as vf
-from fem1d2d import mesh_files, rectangle
+from fem1d2d import rectangle
 
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch):
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+pytestmark = pytest.mark.usefixtures("meshes_read_here")
 
 
 LOW = {"shape": "rectangle", "x": [0, 4], "cells": [8, 2], "young": 3, "poisson": "0.3", "fixed": ["bottom"]}

@@ -27,11 +27,8 @@ def written(comparison, tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def in_this_process(monkeypatch):
+def in_this_process(meshes_read_here):
     """No process for each mesh file."""
-    from mesh_writer import read_here
-
-    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)
 
 
 @pytest.fixture

@@ -32,8 +32,8 @@ from fem1d2d.mesh import Floats, Ints, Split, shared
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
 from verification.interface.body import Body, Name, in_frames, material_of, turning
-from verification.interface.interface import Grid, Interface, Law, Nodes
-from verification.interface.joining import join
+from verification.interface.interface import Interface, Law, Nodes
+from verification.interface.joining import join, width_at
 from verification.interface.several import join_lines, together
 from verification.problem.specification import Problem
 from verification.problem.specs import MOST_CELLS, BodySpec
@@ -299,7 +299,8 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
             f"the initial gap is {interface.gap[j]:.4g} at {interface.contact.place(j)}: the bodies overlap as they"
             " are drawn, and press each other apart before any load acts"
         )
-    own, other = (_edge(grid, interface) for grid in (interface.contact, interface.neumann))
+    nearest = float(interface.contact.x[int(np.argmin(interface.gap))])
+    own, other = (width_at(grid.x, nearest) for grid in (interface.contact, interface.neumann))
     if (
         not interface.one_grid
         and np.ptp(interface.gap) > READING * np.ptp(interface.contact.x)
@@ -313,13 +314,6 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
     if friction and interface.law is not None:
         found += interface.law.warnings(interface)
     return found
-
-
-def _edge(grid: Grid, interface: Interface) -> float:
-    """The longest edge of a grid where the bodies are nearest."""
-    nearest = interface.contact.x[int(np.argmin(interface.gap))]
-    i = int(np.argmin(np.abs(grid.x - nearest)))
-    return float(np.abs(np.diff(grid.x[max(i - 1, 0) : i + 2])).max(initial=0.0))
 
 
 def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True, obstacle: bool = False) -> TwoBodies:

@@ -104,7 +104,7 @@ def _contact(touch: Touch, *, several: bool) -> str:
 
 
 def _missing(bodies: Sequence[Drawn], left_out: Sequence[Touch]) -> Iterator[str]:
-    """Explain why lines that face each other are no contact."""
+    """Explain why lines that face each other are left out."""
     for touch in left_out:
         sides = list(zip(touch.bodies, touch.surface, strict=True))
         bare = [f"the boundary of body {i} {line}" for i, line in sides if line not in bodies[i - 1].sides]

@@ -15,7 +15,7 @@ from fem1d2d import Line, Mesh, MeshError, mesh_files, pieces
 from fem1d2d.mesh import Cells, Floats, Ints, measures, undirected
 from fem1d2d.trace import SAME
 from ndtheory.keys import Part, key, says
-from verification.interface.joining import MOST_OVERLAP, facing_parts
+from verification.interface.joining import MOST_OVERLAP, facing_parts, width_at
 from verification.problem.colours import OddRing, colours
 
 #: Lines may touch whose least distance is at most this part of the smaller extent of their bodies.
@@ -67,12 +67,6 @@ class Drawn(Part):
         for line in Line.parts(bare, "", left=left, away=away):
             found["from ({:g}, {:g}) to ({:g}, {:g})".format(*line.points[[0, -1]].ravel())] = [line]
         return found
-
-
-def _width(s: Floats, at: float) -> float:
-    """The longest edge of a line beside a position."""
-    near = int(np.argmin(np.abs(s - at)))
-    return float(np.abs(np.diff(s[max(near - 1, 0) : near + 2])).max())
 
 
 def bodies_of(path: Path, *, one: bool) -> list[Drawn]:
@@ -209,5 +203,5 @@ def _touch(
         normal=line.normals.mean(axis=0),
         nodes=nodes if contact == 1 else (nodes[1], nodes[0]),
         length=float(line.s[-1]),
-        width=max(_width(line.s, nearest), _width(seen.s, nearest)),
+        width=max(width_at(line.s, nearest), width_at(seen.s, nearest)),
     )

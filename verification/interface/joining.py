@@ -353,6 +353,12 @@ def obstacle_level(spec: BodySpec, other: Floats | None, *, upper: bool) -> Floa
     return np.array(other[:, -1].min() if upper else other[:, -1].max())
 
 
+def width_at(x: Floats, at: float) -> float:
+    """Return the longest edge beside the node of a grid that is nearest to a position; 0 of a single node."""
+    near = int(np.argmin(np.abs(x - at)))
+    return float(np.abs(np.diff(x[max(near - 1, 0) : near + 2])).max(initial=0.0))
+
+
 def obstacle_edges(spec: BodySpec, size: float, grid: Grid, *, upper: bool) -> tuple[Floats, Floats]:
     """Return the ends of the edges around an obstacle that is a line or an arc, with the obstacle on their left.
 

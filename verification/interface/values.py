@@ -10,7 +10,7 @@ import numpy as np
 
 from fem1d2d import means_at_nodes, stresses, von_mises
 from fem1d2d.line import chains
-from fem1d2d.mesh import Floats, undirected
+from fem1d2d.mesh import Floats
 from ndtheory.keys import ABSENT, Key, Part, key
 from verification.interface.assembly import TwoBodies
 from verification.value import Value
@@ -105,11 +105,9 @@ def values_on_sides(bodies: TwoBodies, moved: Displacements) -> dict[str, list[A
             continue
         mesh, d = body.mesh, body.mesh.dimension
         stress = means_at_nodes(mesh, stresses(mesh, body.material, u))
-        on_boundary = undirected(mesh.boundary, len(mesh.points))
-        for side, facets in mesh.sides.items():
+        for side in mesh.sides:
             owner, _, own = side.partition(".") if bodies.problem.several else (f"body{number}", "", side)
-            edges = mesh.boundary[np.isin(on_boundary, undirected(facets, len(mesh.points)))]
-            for nodes in chains(edges) if d == 2 else edges:
+            for nodes in chains(mesh.along(side)) if d == 2 else mesh.along(side):
                 at = mesh.points[nodes].astype(float)
                 steps = np.linalg.norm(np.diff(at, axis=0), axis=1)
                 columns: dict[str, list[Any]] = {"body": [int(owner.removeprefix("body"))] * len(nodes)}

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_writer import read_here, write_gmsh22
+from mesh_writer import write_gmsh22
 from problem_list import blocks, changed
 from strategies import AT_NIGHT
 
 import verification as vf
-from fem1d2d import mesh_files, rectangle
+from fem1d2d import rectangle
 from verification.algorithm.affine_piece import Piece
 from verification.certificate import check
 from verification.contact.active_set import Pattern
@@ -174,8 +174,7 @@ def test_contact_nodes_in_another_order_are_refused(order):
     assert not refused(document)
 
 
-def test_a_body_with_a_hole_has_a_certificate(tmp_path, monkeypatch):
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+def test_a_body_with_a_hole_has_a_certificate(tmp_path):
     whole = rectangle((0.0, 3.0), (-3.0, 0.0), (3, 3))
     inside = np.all(np.abs(whole.points[whole.cells].mean(axis=1) - (1.5, -1.5)) < 0.5, axis=1)
     sides = {name: whole.sides[name] for name in ("bottom", "top")}

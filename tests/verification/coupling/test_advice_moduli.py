@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mesh_writer import read_here, write_gmsh22
+from mesh_writer import write_gmsh22
 from strategies import AT_NIGHT, fewer
 
 import verification as vf
-from fem1d2d import mesh_files, rectangle
+from fem1d2d import rectangle
 from ndtheory import HypothesisError
 
 youngs = st.integers(1, 100)
@@ -135,10 +135,9 @@ def graded(path, layers: int, cells: int):
     )
 
 
-def test_on_graded_meshes_corners_raise_rho_towards_their_bounds_with_and_without_friction(tmp_path, monkeypatch):
+def test_on_graded_meshes_corners_raise_rho_towards_their_bounds_with_and_without_friction(tmp_path):
     """One over the root of the distance to the bound grows alike with each two layers: the distance is 1/log^2 h."""
     bounds = vf.advise_moduli(young=(7, 2), poisson=("0.3", "0.3"), corners="2").moduli.roles[1].corners
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
     upper = [vf.measure(graded(tmp_path, layers, 3).swapped()) for layers in (3, 5, 7)]
     for name, kind in (("rho_max", "stick"), ("rho_normal", "slide")):
         seen = [getattr(measured, name).value for measured in upper]

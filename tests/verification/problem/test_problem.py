@@ -12,7 +12,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
-from mesh_writer import read_here, write_gmsh22
+from mesh_writer import write_gmsh22
 from problem_list import bars, small
 from strategies import fewer
 
@@ -290,12 +290,6 @@ def test_a_problem_that_cannot_be_built_is_refused_by_every_function(function, k
 # --- mesh files ---
 
 
-@pytest.fixture
-def read_at_once(monkeypatch):
-    """Files of meshes are read in this process: those of these tests need no limits."""
-    monkeypatch.setattr("fem1d2d.mesh_files.read_in_process", read_here)
-
-
 def gmsh(path, mesh, version="2.2", order=None):
     """Write a rectangle for Gmsh with its sides as physical names; ``order`` renumbers the nodes."""
     number = np.arange(len(mesh.points)) if order is None else np.argsort(order)
@@ -342,7 +336,7 @@ def meshed(folder, version="2.2", order=None):
     return vf.Problem.from_dict(data, source=str(folder / "problem.toml"))
 
 
-@pytest.mark.usefixtures("known_bounds", "read_at_once")
+@pytest.mark.usefixtures("known_bounds")
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
 def test_a_rectangle_from_a_mesh_file_is_the_built_in_one(tmp_path, version):
     from_file, built_in = (vf.compare(given).content() for given in (meshed(tmp_path, version), plane()))
@@ -355,7 +349,7 @@ def test_a_rectangle_from_a_mesh_file_is_the_built_in_one(tmp_path, version):
     assert from_file == built_in
 
 
-@pytest.mark.usefixtures("known_bounds", "read_at_once")
+@pytest.mark.usefixtures("known_bounds")
 def test_the_numbering_of_a_mesh_file_does_not_matter(tmp_path):
     renumbered = vf.compare(meshed(tmp_path, order=np.random.default_rng(7).permutation)).to_dict()
     expected = vf.compare(plane()).to_dict()
@@ -368,7 +362,6 @@ def test_the_numbering_of_a_mesh_file_does_not_matter(tmp_path):
     assert renumbered["run"]["iterations"] == expected["run"]["iterations"]
 
 
-@pytest.mark.usefixtures("read_at_once")
 def test_one_body_from_a_file_meets_a_built_in_one(tmp_path):
     both = meshed(tmp_path)
     mixed = dataclasses.replace(both, body2=plane().body2)

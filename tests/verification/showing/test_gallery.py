@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_writer import read_here, write_gmsh22
+from mesh_writer import write_gmsh22
 
 import verification as vf
-from fem1d2d import mesh_files
 from verification.interface.assembly import discretise
 
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
@@ -25,12 +24,6 @@ COARSE = 4
 def gallery(monkeypatch):
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     return import_module("gallery").GALLERY
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch):
-    """No process for each mesh file."""
-    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
 
 
 @pytest.mark.parametrize("row", RECORD, ids=lambda row: row["name"])
