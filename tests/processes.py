@@ -25,7 +25,7 @@ UNDRAWN = """
     from verification.cli import main
 
     drawn = lambda *args: None
-    figures = dict.fromkeys(("draw_bodies", "draw_residuals", "draw_waterfall"), drawn)
+    figures = dict.fromkeys(("draw_bodies", "draw_residuals", "draw_ruler", "draw_waterfall"), drawn)
     save = lambda figure, path: path.write_bytes(b"<svg><dc:title>ndtheory</dc:title></svg> Software\\0ndtheory")
     sys.modules["verification.figures"] = SimpleNamespace(save=save, **figures)
     sys.exit(main())

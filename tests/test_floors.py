@@ -54,7 +54,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "relaxation remedy runs start theta"
         )
     },
-    "bounds": {"verification.bounds": "__init__ bound losses table verdicts"},
+    "bounds": {"verification.bounds": "__init__ bound losses ruler table verdicts"},
     "answers": {"verification": "comparison", "verification.algorithm": "history"},
     "sections of the core": {
         "verification.sections": "__init__ answer bounds comparison constants history run setting"
@@ -92,7 +92,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "figures": {
         "verification.figures": (
             "__init__ best_theta bodies factor history layer_plane layers proof_map region reproduction residuals "
-            "squares style sweep waterfall"
+            "ruler squares style sweep waterfall"
         )
     },
     "files": {"verification.output": "__init__ fields files folder inputs report"},

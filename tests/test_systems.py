@@ -49,7 +49,7 @@ sys.path.insert(0, sys.argv.pop(1))
 USED = """
 from verification.cli import main
 
-drawn = dict.fromkeys(("draw_bodies", "draw_residuals"), lambda *given: None)
+drawn = dict.fromkeys(("draw_bodies", "draw_residuals", "draw_ruler"), lambda *given: None)
 save = lambda figure, path: path.write_bytes(b"<svg><dc:title>ndtheory</dc:title></svg> Software\\0ndtheory")
 sys.modules["verification.figures"] = types.SimpleNamespace(save=save, **drawn)
 said = [main(["run", "plate.toml", "-o", "found"]) for _ in range(2)]

@@ -88,8 +88,9 @@ class Document(Value, keys.Part, ABC):
         return registry.sections(self)
 
     def _repr_html_(self) -> str:
-        """Return the notebook view: its sections, or the document where there are none."""
-        return f"<pre>{html.escape(text(self.sections()) or self.to_json())}</pre>"
+        """Return the notebook view: what a command shows first, or the document where it shows nothing."""
+        registry.of_class("sections", self)
+        return f"<pre>{html.escape(text(registry.screen(self)) or self.to_json())}</pre>"
 
     def plot(self) -> Figure:
         """Draw the main figure of the result.

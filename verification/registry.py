@@ -107,6 +107,12 @@ def sections(result: Any) -> tuple[Any, ...]:
 
 
 @singledispatch
+def screen(result: Any) -> tuple[Any, ...]:
+    """The sections that a reader sees first: all, unless ``screen.register`` has a shorter form for the class."""
+    return sections(result)
+
+
+@singledispatch
 def draw(result: Any, **options: Any) -> Any:
     """Draw the main figure of a result with the options of its ``plot``; ValueError if there is nothing to draw."""
     raise ValueError(f"a {type(result).__name__} has no figure")

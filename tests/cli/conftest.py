@@ -96,6 +96,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
     monkeypatch.setattr(figures, "draw_history", lambda history, view: view)
     monkeypatch.setattr(figures, "draw_residuals", lambda run, bounds=(): "residuals")
+    monkeypatch.setattr(figures, "draw_ruler", lambda found: "ruler")
     monkeypatch.setattr(figures, "draw_waterfall", lambda losses, unit: "waterfall")
     monkeypatch.setattr(figures, "draw_region", lambda plane: "region")
     monkeypatch.setattr(

@@ -7,7 +7,10 @@ import tomllib
 import pytest
 
 import ndtheory
+from verification import comparison, registry
 from verification.cli.problems import examples
+from verification.registry import BOUNDS
+from verification.show.layout import lines as shown
 
 COMMANDS = ["example", "demo", "bounds", "constants", "run", "solve", "compare", "advise", "certify", "region"]
 COMMANDS += ["sweep", "reproduce", "verify"]
@@ -110,8 +113,10 @@ def test_every_built_in_problem_has_its_expected_status():
         *[("run", "inside"), ("run", "two-bars"), ("solve", "signorini"), ("constants", "section6-190")],
     ],
 )
-def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, command, name):
-    answer = call(command, built_in(name))
+def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monkeypatch, command, name):
+    compare, kept = comparison.compare, []
+    monkeypatch.setattr(comparison, "compare", lambda *given, **more: kept.append(compare(*given, **more)) or kept[0])
+    answer = call(command, built_in(name), *(["--full"] if command == "compare" else []))
     assert answer.status == dict(zip(("run", "compare"), BUILT_IN[name], strict=True)).get(command, 0)
     lines = answer.out.splitlines()
     assert lines[0].startswith(tomllib.loads(examples()[name])["title"])
@@ -119,6 +124,14 @@ def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, comma
     assert lines[-1].startswith("Next: ndtheory ")
     assert len(lines) <= 46
     assert [line for line in lines if len(line) > 80] == []
+    for result in kept:
+        short = [line for line, _ in shown(registry.screen(result), "terminal")]
+        assert len(short) <= 15
+        assert {"Not claimed: anything about the continuum, or the local Coulomb law.", *lines[:2]} < set(short)
+        judged = [line for line in lines if line.startswith(tuple(f"  {name} " for name in BOUNDS))]
+        assert judged
+        for bound in result.bounds:
+            assert [line for line in short if re.search(rf"\b{bound}\b", line)]
 
 
 @pytest.mark.parametrize("name", ["section6-190", "signorini", "two-bars"])
@@ -174,7 +187,7 @@ def test_no_conclusion_is_no_error_and_a_factor_near_one_shows_its_distance_from
 
 
 def test_stresses_carry_the_unit_of_the_file(call, write):
-    screen = call("compare", write({"units.stress": '"ksi"', "units.length": '"in"'})).out
+    screen = call("compare", write({"units.stress": '"ksi"', "units.length": '"in"'}), "--full").out
     assert "E 70000 / 20000 ksi" in screen
     assert "ksi in (per unit thickness)" in screen
     assert "r = 0.3 in" in screen
@@ -357,7 +370,11 @@ def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(
     assert {path.name for path in folder.iterdir()} == {
         *{"problem.toml", "report.html", "contact.csv", "history.csv", "interface.npz", "compare.json"},
         *{"body1.vtu", "body2.vtu", "sides.csv"},
-        *(f"{figure}.{ending}" for figure in ("bodies", "residuals", "waterfall") for ending in ("svg", "png")),
+        *(
+            f"{figure}.{ending}"
+            for figure in ("bodies", "residuals", "ruler", "waterfall")
+            for ending in ("svg", "png")
+        ),
     }
     assert (folder / "problem.toml").read_text(encoding="utf-8") == examples()["section6"]
     assert call("demo") == answer  # over its own files
@@ -375,7 +392,7 @@ def test_the_written_document_is_that_of_stdout(call, quick, write, tmp_path, co
 def test_two_thresholds_on_friction_have_two_names_and_the_printed_one_its_unit(call, write):
     """Every small theta, some theta: on the screens of compare and of the calculator."""
     calculator = ["bounds", "--m", "1", "--M", "2", "--CR", "3/2", "--CK", "1/400", "--theta", "1/10"]
-    for arguments, on, unit in ((["compare", write()], "k", "MPa"), (calculator, "C_K", "the unit of --m")):
+    for arguments, on, unit in ((["compare", write(), "--full"], "k", "MPa"), (calculator, "C_K", "the unit of --m")):
         lines = call(*arguments).out.splitlines()
         head = next(i for i, line in enumerate(lines) if "every small" in line)
         assert lines[head].split() == ["every", "small", "some"]

@@ -9,7 +9,7 @@ KNOWN = ", ".join(BOUNDS)
 
 
 def test_only_the_bounds_that_are_named_are_worked_out(call, write):
-    answer = call("compare", write(), "--bounds", "energy,printed")
+    answer = call("compare", write(), "--bounds", "energy,printed", "--full")
     assert answer.status == 0
     table = answer.out[answer.out.index("DOES ONE STEP CONTRACT?") : answer.out.index("WHAT HAPPENED")]
     assert [line.split()[0] for line in table.splitlines()[3:5]] == ["printed", "energy"]

@@ -73,7 +73,7 @@ STAGES = ["measuring", "iterating", "linearising", "repeating the run by cvxpy",
 
 
 def test_a_reader_has_each_table_before_what_is_slower_begins(write, tmp_path):
-    found = ended(MARKED, "compare", write(), "-o", tmp_path / "results")
+    found = ended(MARKED, "compare", write(), "--full", "-o", tmp_path / "results")
     assert (found.returncode, found.stderr) == (0, "")
     seen = [begin for line in found.stdout.splitlines() for begin in ORDER if line.startswith(begin)]
     assert seen == ORDER
@@ -102,8 +102,8 @@ def test_a_document_is_written_last_and_alone(write, capfd, monkeypatch):
 def test_the_parts_make_the_view_of_a_notebook(call, write, edits):
     """A command says on stderr which change may let a run converge, a notebook among the parts."""
     file = write(edits)
-    *shown, following = call("compare", file).out.splitlines()
-    assert following.startswith("Next: ")
+    *shown, more, following = call("compare", file).out.splitlines()
+    assert (more, following[:6]) == ("All numbers: --full.", "Next: ")
     view = vf.compare(vf.load(file))._repr_html_()
     lines = html.unescape(view.removeprefix("<pre>").removesuffix("</pre>")).splitlines()
     added = [line for line in lines if line not in shown]
@@ -150,9 +150,9 @@ def fail(*args, **options):
 
 
 def test_ctrl_c_after_the_first_tables_leaves_them_and_says_what_is_missing(call, write, monkeypatch):
-    whole = call("compare", write()).out
+    whole = call("compare", write(), "--full").out
     monkeypatch.setattr("verification.semidefinite.losses.locate", interrupt)
-    answer = call("compare", write())
+    answer = call("compare", write(), "--full")
     assert answer.status == 130
     assert answer.err.startswith("interrupted after the run had ended (converged), ")
     assert answer.err.count("\n") == 1
@@ -177,9 +177,9 @@ def test_ctrl_c_after_the_first_tables_leaves_them_and_says_what_is_missing(call
 def test_what_ends_a_comparison_leaves_the_tables_before_it(
     call, write, monkeypatch, module, name, last, what, status, says
 ):
-    whole = call("compare", write()).out
+    whole = call("compare", write(), "--full").out
     monkeypatch.setattr(module, name, what)
-    answer = call("compare", write())
+    answer = call("compare", write(), "--full")
     assert answer.status == status
     assert last in answer.out
     if (what, name) == (interrupt, "work_out"):  # the run is known: the rest is told without the bound
@@ -203,7 +203,7 @@ def test_a_broken_import_by_ctrl_c_after_the_first_tables_does_not_deny_them(cal
             raise ImportError("initialization failed") from None
 
     monkeypatch.setattr(comparison, "run", broken)
-    answer = call("compare", write())
+    answer = call("compare", write(), "--full")
     assert (answer.status, answer.err) == (130, "interrupted; what was computed is shown above\n")
     assert "DOES ONE STEP CONTRACT?" in answer.out
 

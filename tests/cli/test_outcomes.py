@@ -49,7 +49,7 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
     line = rf"^  observed +{ended} after " if command == "compare" else rf"^  observed .* {ended}$"
     assert re.search(line, screen.out, flags=re.M)
     assert [line for line in screen.out.splitlines() if len(line) > 80 and str(file) not in line] == []
-    assert answer.err == screen.err
+    assert answer.err.split() == screen.err.split()
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_the_worst_verdict_decides(call, write, monkeypatch, judged, edits, stat
     made = {name: Judgement(verdict=verdict, reason="made up") for name, verdict in judged.items()}
     compare = comparison.compare
     monkeypatch.setattr(comparison, "compare", lambda *args, **kw: replace(compare(*args, **kw), verdicts=made))
-    answer = call("compare", write(edits))
+    answer = call("compare", write(edits), "--full")
     assert answer.status == status
     for name, verdict in judged.items():
         assert re.search(rf"^  {NAMES.get(name, name)} +{WORDS[verdict]} +made up$", answer.out, flags=re.M)
@@ -165,7 +165,7 @@ def test_ctrl_c_leaves_a_screen(call, endless, after, command):
     after(3, lambda: signal.raise_signal(signal.SIGINT))
     answer = call(command, endless)
     assert answer.status == INTERRUPTED
-    assert "  interrupted\n" in answer.out
+    assert re.search(r"^  observed .*interrupted( after \d+ steps\b.*)?$", answer.out, flags=re.M)
 
 
 @pytest.mark.parametrize("judged", ["VIOLATED", "INCONCLUSIVE"])
@@ -193,7 +193,7 @@ def test_ctrl_c_while_files_are_written_still_shows_what_was_computed(
     monkeypatch.setattr(figures, "save", lambda figure, path: signal.raise_signal(signal.SIGINT))
     answer = call(command, write(), "-o", tmp_path / "results")
     assert answer.status == INTERRUPTED
-    assert "WHAT HAPPENED" in answer.out
+    assert "  observed  " in answer.out
     assert "before anything was computed" not in answer.err
     names = {path.name for path in (tmp_path / "results").iterdir()}
     assert f"{command}.json" in names
@@ -205,7 +205,7 @@ def test_a_folder_with_a_file_of_somebody_else_costs_no_result(call, quick, writ
     (tmp_path / "bodies.png").write_bytes(b"my own")
     answer = call(command, write(), "-o", tmp_path)
     assert answer.status == BAD_INPUT
-    assert answer.out == "" or "WHAT HAPPENED" in answer.out
+    assert answer.out == "" or "  observed  " in answer.out
     assert {path.name for path in tmp_path.iterdir()} == {"problem.toml", "bodies.png"}
 
 
@@ -221,7 +221,7 @@ def test_a_disk_that_fills_up_is_told_in_one_line_and_costs_no_result(
     assert answer.status == BAD_INPUT
     assert "Traceback" not in answer.err
     assert "No space left on device" in answer.err
-    assert "WHAT HAPPENED" in answer.out
+    assert "  observed  " in answer.out
 
 
 # --- advice ---
@@ -371,14 +371,14 @@ def test_a_remedy_names_no_roles_that_are_refused(call, write):
 
 @pytest.mark.parametrize("edits", [{"iteration.relaxation": '"aitken"'}, "local law"], ids=["aitken", "local law"])
 def test_the_answer_allows_no_theta_where_no_bound_applies(call, write, edits):
-    out = call("compare", write(edits), "--bounds", "energy").out
+    out = call("compare", write(edits), "--bounds", "energy", "--full").out
     answer = out[out.index("DOES IT CONVERGE") : out.index("DOES ONE STEP CONTRACT?")]
     assert re.search(r"^  bound +none: ", answer, flags=re.M)
     assert "allows" not in answer
 
 
 def test_the_answer_names_the_thetas_allowed_where_that_of_the_run_is_not(call, write):
-    out = call("compare", write(), "--bounds", "energy", "--theta", "0.999").out
+    out = call("compare", write(), "--bounds", "energy", "--theta", "0.999", "--full").out
     bound = re.search(r"^  bound +(none.*)$", out, flags=re.M)[1]
     (allowed,) = re.findall(r"the energy bound allows (.*)$", out, flags=re.M)
     assert bound == f"none at this theta: outside {allowed}"

@@ -15,7 +15,7 @@ def test_a_registered_bound_has_its_verdict_on_the_screen_and_its_exit_status(
     call, write, monkeypatch, bound, status, verdict
 ):
     monkeypatch.setitem(BOUNDS, bound.name, bound)
-    answer = call("compare", write(), "--bounds", f"energy,{bound.name}")
+    answer = call("compare", write(), "--bounds", f"energy,{bound.name}", "--full")
     assert answer.status == status
     rows = answer.out[answer.out.index("DOES THE RUN AGREE") :].splitlines()
     assert any(row.split("  ")[1].strip() == bound.name and verdict in row for row in rows if row.startswith("  "))

@@ -54,7 +54,7 @@ def numbers_of(line):
 def test_compare_shows_proved_ends_with_their_mark_and_its_legend(call, write):
     file = write()
     document = call("compare", file, "--verified", "--json").document
-    screen = call("compare", file, "--verified").out
+    screen = call("compare", file, "--verified", "--full").out
     lines = screen.splitlines()
     assert max(map(len, lines[:-1])) <= 80
     assert "v (verified): proved for the exact data" in " ".join(screen.split())
@@ -77,7 +77,7 @@ def test_compare_shows_proved_ends_with_their_mark_and_its_legend(call, write):
 
 
 def test_compare_without_the_word_has_no_marks(call, write):
-    screen = call("compare", write()).out
+    screen = call("compare", write(), "--full").out
     assert " v " not in screen
     assert "verified" not in screen
 
@@ -87,5 +87,5 @@ def test_what_is_not_certified_is_told_on_the_screen(call, write, monkeypatch):
         raise NotExact("these bodies are made up")
 
     monkeypatch.setattr("verification.certificate.claims.describe", refused)
-    screen = " ".join(call("compare", write(), "--verified").out.split())
+    screen = " ".join(call("compare", write(), "--verified", "--full").out.split())
     assert "lmi is not proved: these bodies are made up" in screen

@@ -135,7 +135,7 @@ def sketched(shared: Shared, evidence: Callable[[str], Any]) -> Iterator[None]:
         patch.setattr(comparison, "by_cvxpy_alone", repeated_once(comparison.by_cvxpy_alone, shared))
         continuum_once(patch, shared)
         patch.setitem(SOURCES, searched, lambda ids, *_: {id: found[id] for id in ids if id in found})
-        for name in ("draw_bodies", "draw_residuals", "draw_waterfall", "draw_region"):
+        for name in ("draw_bodies", "draw_residuals", "draw_ruler", "draw_waterfall", "draw_region"):
             patch.setattr(figures, name, lambda *args, **options: None)
         patch.setattr(figures, "save", lambda figure, path: path.write_bytes(b""))
         patch.setattr(plane, "THETAS", (0.2, 0.6))

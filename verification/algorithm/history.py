@@ -22,7 +22,7 @@ from ndtheory.number import Numeric
 from verification.algorithm.arrival import NO_FORCE
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.monolithic import Solution, SolveError, solve
-from verification.algorithm.rates import largest_step_ratio
+from verification.algorithm.rates import largest_step_ratio, steps
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.runs import Run, check_memory, run_from
 from verification.algorithm.start import LEAST, Start, begin_at, tied_size
@@ -375,9 +375,7 @@ def steps_to(first: float, last: float, factor: float) -> int | None:
     """
     if first <= last:
         return 0
-    if not (0 <= factor < 1 and 0 < last < first < math.inf):
-        return None
-    return math.ceil(math.log(last / first) / math.log(factor) * (1 - 1e-12)) if factor else 1
+    return steps(factor, last / first) if 0 < last < first < math.inf else None
 
 
 def march(

@@ -9,7 +9,7 @@ import io
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TextIO, TypeVar
 
@@ -20,7 +20,7 @@ from ndtheory.texts import printable
 from verification.document import Document
 from verification.machine.interrupts import undisturbed
 from verification.machine.progress import Progress, silent
-from verification.show.layout import Typing, lines, nothing_typed
+from verification.show.layout import Typing, folded, lines, nothing_typed
 from verification.show.parts import Sections
 
 if TYPE_CHECKING:
@@ -177,6 +177,13 @@ def complain(text: str) -> None:
         spend(sys.stderr)
 
 
+def warn(warnings: Sequence[str], lead: str = "warning: ", *, wide: bool = False) -> None:
+    """Report sentences, each on one line where it is ``wide``, or folded to the width of a screen."""
+    for words in (lead + warning for warning in warnings):
+        for line in [words] if wide else folded(words, 0):
+            complain(line)
+
+
 def as_figure(found: Document, path: Path) -> None:
     """Write the main figure of a result."""
     from verification.figures import save
@@ -192,8 +199,9 @@ def deliver(
     folder: Path | None = None,
     *,
     typing: Typing = nothing_typed,
+    warnings: Sequence[str] = (),
 ) -> None:
-    """Show a result, then write its files: an error while writing loses no result.
+    """Show a result and its warnings, then write its files: an error while writing loses no result.
 
     ``as_json`` shows the document instead of its sections.  ``write`` writes into ``folder``, if given; ``typing``
     completes the command to type next.
@@ -204,6 +212,7 @@ def deliver(
             say(text)
         else:
             show(sections(document), typing)
+    warn(warnings, wide=as_json)
     if write is None:
         return
     try:

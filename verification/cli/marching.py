@@ -11,7 +11,7 @@ import click
 from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import cli
 from verification.cli.options import FOLDER, JSON, RUN, OneOf, Typed, of_a_file
-from verification.cli.problems import complain_of, load, warn
+from verification.cli.problems import complain_of, load
 
 if TYPE_CHECKING:
     from verification.algorithm.history import Increment
@@ -60,8 +60,8 @@ def march(typed: Typed, solver: Any, method: Any, folder: Path | None, as_json: 
             found = found.linearise() if found.converged else found
         except KeyboardInterrupt:  # costs no increment
             found = replace(found, interrupted=True)
-    warn(found.warnings)
-    deliver(found, sections, as_json, write, folder, typing=replace(typed, folder=folder).command)
+    typing = replace(typed, folder=folder).command
+    deliver(found, sections, as_json, write, folder, typing=typing, warnings=found.warnings)
     if found.ended or found.interrupted:
         complain(f"{found.ended or 'interrupted after the last increment'}: what was computed is kept")
     last = found.increments[-1].result

@@ -96,6 +96,8 @@ BOUNDS = click.option(
     help="Only these bounds, as printed,repaired,energy; all but lyapunov by default, and without lmi it is fast.",
 )
 
+FULL = click.option("--full", is_flag=True, help="Show all numbers; the first screen has 15 lines.")
+
 THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, instead of the file's.")
 SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Exchange the roles of the bodies.")
 SOLVER = click.option(

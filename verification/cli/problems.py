@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import click
 
 from ndtheory.keys import key
-from verification.cli.console import complain, deliver, one_by_one, progress, remember, say, stages
+from verification.cli.console import complain, deliver, one_by_one, progress, remember, say, stages, warn
 from verification.cli.forms import cli
-from verification.cli.options import BOUNDS, FOLDER, JSON, PATH, RUN, SWAP, Typed, folder_name, of_a_file
+from verification.cli.options import BOUNDS, FOLDER, FULL, JSON, PATH, RUN, SWAP, Typed, folder_name, of_a_file
 from verification.document import Document
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ def run(typed: Typed, solver: Any, start: Path | None, folder: Path | None, as_j
     write = writer(folder, "run")
     pair = pair_from(problem, obstacle=True)
     g = None if start is None else forces(read_vector(start), pair, str(start))
-    warn(pair.warnings)
+    warn(pair.warnings, wide=as_json)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
         finished = runs.run(pair, start=g, solver=solver, watch=watch)
         tell("linearising", None)
@@ -188,8 +188,8 @@ def run(typed: Typed, solver: Any, start: Path | None, folder: Path | None, as_j
             finished = finished.linearise()
         except KeyboardInterrupt:  # costs no run
             finished = replace(finished, interrupted=True).linearise()
-    warn(finished.warnings[len(pair.warnings) :])
-    deliver(finished, sections, as_json, write, folder, typing=typed.command)
+    said = finished.warnings[len(pair.warnings) :]
+    deliver(finished, sections, as_json, write, folder, typing=typed.command, warnings=said)
     return _status_of_run(finished, typed.swap)
 
 
@@ -217,12 +217,12 @@ def solve(typed: Typed, folder: Path | None, as_json: bool) -> int:
     problem = load(typed)
     write = writer(folder, "solve")
     bodies = discretise(problem)
-    warn(bodies.warnings)
+    warn(bodies.warnings, wide=as_json)
     with stages() as tell:
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
-    warn(solution.warnings[len(bodies.warnings) :])
-    deliver(solution, run.solution, as_json, write, folder, typing=replace(typed, folder=folder).command)
+    typing, said = replace(typed, folder=folder).command, solution.warnings[len(bodies.warnings) :]
+    deliver(solution, run.solution, as_json, write, folder, typing=typing, warnings=said)
     return 0
 
 
@@ -233,10 +233,17 @@ def solve(typed: Typed, folder: Path | None, as_json: bool) -> int:
 )
 @click.option("--verified", is_flag=True, help="Prove constants and bounds, for the exact data of FILE on its mesh.")
 @BOUNDS
+@FULL
 @FOLDER
 @JSON
 def compare(
-    typed: Typed, folder: Path | None, solver: Any, as_json: bool, bounds: tuple[str, ...] | None, **asked: Any
+    typed: Typed,
+    folder: Path | None,
+    solver: Any,
+    full: bool,
+    as_json: bool,
+    bounds: tuple[str, ...] | None,
+    **asked: Any,
 ) -> int:
     """Measure constants, evaluate bounds, run, and judge each bound.
 
@@ -256,7 +263,7 @@ def compare(
         if all(registry.BOUNDS[name].calculated for name in bounds):
             needed = "needed a bound among them that can be brought closer"
             raise click.ClickException(f"received --exact with --bounds {','.join(bounds)}: {needed}")
-    return _compare(load(typed), typed, folder, solver, as_json, bounds=bounds, **asked)
+    return _compare(load(typed), typed, folder, solver, full, as_json, bounds=bounds, **asked)
 
 
 @cli.command()
@@ -270,8 +277,9 @@ def compare(
     show_default=True,
     help="Folder to write.",
 )
+@FULL
 @JSON
-def demo(folder: Path, as_json: bool) -> int:
+def demo(folder: Path, full: bool, as_json: bool) -> int:
     """Compare on the built-in model of Section 6, into a folder.
 
     The folder gets the problem file, the report, the figures and the JSON document.
@@ -283,34 +291,31 @@ def demo(folder: Path, as_json: bool) -> int:
     from verification.output.folder import Folder
 
     typed = Typed(file=Folder(folder, "compare").write_problem(examples()["section6"]))
-    status = _compare(load(typed), typed, folder, "auto", as_json)
+    status = _compare(load(typed), typed, folder, "auto", full, as_json)
     for line in [] if as_json else unreached():
         complain(line)
     return status
 
 
-def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, **asked: Any) -> int:
+def _compare(
+    problem: Problem, typed: Typed, folder: Path | None, solver: Any, full: bool, as_json: bool, **asked: Any
+) -> int:
     from verification import comparison as verdicts
     from verification.interface.pair import pair_from
     from verification.output.folder import writer
-    from verification.sections.comparison import Parts
-    from verification.sections.comparison import verdicts as end
+    from verification.sections.comparison import FirstParts, Parts, proofs
+    from verification.sections.comparison import verdicts as last
 
     write = writer(folder, "compare")
     pair = pair_from(problem)
-    warn(pair.warnings)
-    parts = None if as_json else Parts(pair, one_by_one(needed=write is not None))
+    warn(pair.warnings, wide=as_json)
+    begin, end = (Parts, last) if full else (FirstParts, proofs)
+    parts = None if as_json else begin(pair, one_by_one(needed=write is not None))
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch, parts or nullcontext():
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
-    warn(comparison.run.warnings[len(pair.warnings) :])
-    deliver(comparison, end, as_json, write, folder, typing=typed.command)
+    said = comparison.run.warnings[len(pair.warnings) :]
+    deliver(comparison, end, as_json, write, folder, typing=typed.command, warnings=said)
     return _status_of_comparison(comparison, typed.swap)
-
-
-def warn(warnings: Sequence[str], lead: str = "warning: ") -> None:
-    """Report sentences, one a line."""
-    for warning in warnings:
-        complain(lead + warning)
 
 
 def _status_of_run(finished: Run, swapped: bool) -> int:

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import click
 
 from ndtheory.texts import printable
-from verification.cli.console import complain, deliver, stages
+from verification.cli.console import complain, deliver, stages, warn
 from verification.cli.forms import cli
 from verification.cli.options import BOUNDS, FILE, FOLDER, JOBS, JSON, PATH, STORE, SWAP, Typed, of_a_file, one_file
-from verification.cli.problems import load, warn
+from verification.cli.problems import load
 from verification.problem.tables import ProblemError, unreadable
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def sweep(
     if dry_run:
         planned = plan(problem, grid, kept, fresh=fresh, retry=retry)
         deliver(planned, shown.plan, as_json)
-        warn(planned.notes, "")
+        warn(planned.notes, "", wide=True)
         return
     targets = _targets(file.stem, target, plots, export)
     if log is not None:
@@ -125,7 +125,7 @@ def sweep(
     with _progress(log) as tell:
         work = work_of(jobs or -1, dask)
         found = sweep_grid(problem, grid, work=work, store=kept, fresh=fresh, retry=retry, progress=tell)
-    warn(found.notes, "")
+    warn(found.notes, "", wide=True)
     if found.stored:
         complain(f"{kept}: {found.stored} of {found.asked} rows were there")
     sections = lambda found: shown.sections(found, target)

@@ -10,6 +10,7 @@ from verification.figures.proof_map import draw_map
 from verification.figures.region import draw_region
 from verification.figures.reproduction import draw_reproduction
 from verification.figures.residuals import draw_residuals
+from verification.figures.ruler import draw_ruler
 from verification.figures.squares import draw_squares
 from verification.figures.style import save
 from verification.figures.sweep import draw_rules, draw_sweep
@@ -26,6 +27,7 @@ __all__ = [
     "draw_region",
     "draw_reproduction",
     "draw_residuals",
+    "draw_ruler",
     "draw_rules",
     "draw_squares",
     "draw_sweep",

@@ -45,7 +45,7 @@ FILES: dict[Kind, tuple[str, ...]] = {
         *("history.json", "contact.csv", "history.csv", *_VALUES, *_SERIES),
         *_drawn("loop", "states", "shear", "points"),
     ),
-    "compare": ("compare.json", *_RUN, *_drawn("waterfall", "factor"), "report.html"),
+    "compare": ("compare.json", *_RUN, *_drawn("ruler", "waterfall", "factor"), "report.html"),
     "reproduce": ("reproduce.json", *_drawn("reproduce"), *(f"fig{number}.csv" for number in (5, 10, 11, 12))),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
 }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ndtheory import __version__
 from verification.algorithm.runs import Run
+from verification.bounds.ruler import ruler
 from verification.document import Document
 from verification.interface.files import write_interface, write_transfer
 from verification.interface.values import columns_of, values_on_sides
@@ -179,6 +180,8 @@ def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None 
     drawn = {"bodies": figures.draw_bodies(result)}
     if isinstance(result, Run):
         drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.computed)
+        if comparison is not None and ruler(comparison.computed, result):
+            drawn["ruler"] = figures.draw_ruler(comparison)
     if comparison is not None and comparison.losses is not None:
         drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
     if comparison is not None and any(BOUNDS[bound.name].on_request for bound in comparison.computed):

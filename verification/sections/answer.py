@@ -17,8 +17,8 @@ CAPTION = (
 )
 
 
-def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
-    """The answer after a run.
+def answer(finished: Run, bounds: Sequence[BoundResult], *, alone: bool = True) -> Section:
+    """The answer after a run; ``alone`` where no table of the bounds follows in this section.
 
     Parameters
     ----------
@@ -29,7 +29,8 @@ def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
     proved = [bound for bound in bounds if bound.proved and bound.worked_out]
     applies = finished.relaxation == "constant" and not finished.outside
     theta = _theta(proved, allowed=_widest(proved) if applies else None)
-    parts = (Labelled("observed", _seen(finished)), Labelled("bound", _bound(finished, proved)), *theta)
+    bound = [Labelled("bound", _bound(finished, proved))] if alone else []
+    parts = (Labelled("observed", _seen(finished)), *bound, *theta)
     return section("answer", "DOES IT CONVERGE, AND HOW FAST?", *parts, caption=CAPTION)
 
 

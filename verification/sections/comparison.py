@@ -11,6 +11,7 @@ from verification.algorithm.runs import Run
 from verification.algorithm.theta import Choice
 from verification.bounds.bound import BoundResult
 from verification.bounds.losses import Losses
+from verification.bounds.ruler import promised
 from verification.bounds.verdicts import RunVerdict
 from verification.comparison import Comparison, Listener
 from verification.constants import Measured
@@ -19,10 +20,22 @@ from verification.sections.answer import answer
 from verification.sections.bounds import bounds, contracts, thetas
 from verification.sections.constants import compared
 from verification.sections.constants import sections as all_constants
-from verification.sections.run import happened, then
+from verification.sections.run import happened, remedied, then
 from verification.sections.setting import limits, setting
-from verification.show.numbers import near_one
-from verification.show.parts import Labelled, Note, Section, Sections, following, outside_the_theorem, section, table
+from verification.show.numbers import count, factor, marked, near_one
+from verification.show.parts import (
+    Cell,
+    Labelled,
+    Note,
+    Quantity,
+    Section,
+    Sections,
+    Shown,
+    following,
+    outside_the_theorem,
+    section,
+    table,
+)
 
 #: The captions of the table of verdicts and of the figure of the losses.
 RATIOS = (
@@ -39,6 +52,14 @@ WATERFALL = (
     ),
 )
 
+
+RULER = (
+    (
+        "ruler",
+        "The steps after which the error is at most the tolerance times the first one, as each bound promises them for "
+        "any loads; the steps that the linearisation at the solution predicts; and the steps of this run.",
+    ),
+)
 
 FACTOR = (("factor", "The factor of one step over theta by each bound, and the rate of the run."),)
 
@@ -130,13 +151,71 @@ class Parts(Listener):
             self.show((section("programs", title, *parts, caption=caption, pictures=FACTOR),))
 
 
+class FirstParts(Parts):
+    """Passes on what the first screen shows before its table: the problem, and the answer as soon as the run ends."""
+
+    def run(self, finished: Run) -> None:
+        self.waiting = []
+        found = answer(finished, self.results, alone=False)
+        self.show((replace(found, parts=(*found.parts, *remedied(finished))),))
+
+    def cvxpy(self, reference: Reference | None, why: str) -> None:
+        """Left out."""
+
+    def losses(self, losses: Losses | None, why: str) -> None:
+        """Left out."""
+
+    def programs(self, results: Sequence[BoundResult]) -> None:
+        """In the table of all bounds, which is the last part."""
+
+
+@registry.screen.register
+def first(result: Comparison) -> Sections:
+    """The first screen, of at most 15 lines: does it converge, how fast, proved by what, which theta, what next?"""
+    if result.problem is None:
+        return ()
+    found: list[Section] = []
+    result.tell(FirstParts(result.run.pair, found.extend))
+    return (*found, *proofs(result))
+
+
+def proofs(result: Comparison) -> Sections:
+    """The end of the first screen: what each bound says of one step and of the run, and what is not claimed."""
+    tolerance = result.run.pair.settings.tolerance
+    rows, without = [], dict[str, list[str]]()
+    for name, bound in result.bounds.items():
+        verdict, steps = result.verdicts[name], promised(bound, tolerance)
+        if bound.factor is None or verdict.verdict in ("HYPOTHESES_NOT_MET", "NOT_COMPUTED"):
+            if bound.asked:
+                without.setdefault(WORDS[verdict.verdict], []).append(name)
+            continue
+        says = marked("contracts", bound.level) if bound.proved else "is claimed to contract"
+        rows.append((name, says, factor(bound.factor, bound.one_minus_factor), _most(steps), WORDS[verdict.verdict]))
+    parts: list[Shown] = []
+    for words, names in without.items():
+        why = "" if result.run.outside else f": {result.verdicts[names[-1]].reason}"
+        parts.append(Labelled(words, f"{', '.join(names)}{why}"))
+    if rows:
+        known = "v: verified" if any(bound.marked for bound in result.bounds.values()) else "in doubles"
+        to = f"steps to {tolerance:.0e}".replace("e-0", "e-")
+        parts.append(table((f"bound, {known}", "one step", "factor", to, "the run"), rows))
+    *limit, last = verdicts(result)[-1].parts
+    more = [] if len(rows) == len(result.bounds) else [Note("All numbers: --full.", 0, only="terminal")]
+    return section("answer", "", *parts), replace(verdicts(result)[-1], parts=(*limit, *more, last))
+
+
+def _most(steps: int | None) -> Cell:
+    """The steps that a bound promises; a power of ten where they are many."""
+    return count(steps, "<= ") if steps is None or steps < 1e6 else Quantity(steps, f"<= {steps:.1e}")
+
+
 def verdicts(result: Comparison) -> Sections:
     """The end of a comparison."""
     judged = table(
         ("bound", "verdict", "why"), [(NAMES.get(n, n), WORDS[j.verdict], j.reason) for n, j in result.verdicts.items()]
     )
     title = "DOES THE RUN AGREE WITH THE BOUND?"
-    return section("verdicts", title, judged, caption=RATIOS), limits(
+    return section("verdicts", title, judged, caption=RATIOS, pictures=RULER), limits(
         result.run.outside, then(result.run, "run", following("advise"))
     )
 

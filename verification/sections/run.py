@@ -76,13 +76,14 @@ def then(finished: Run | Solution, command: str, otherwise: Next) -> Next:
 
 
 def unfinished(finished: Run, first: str = "") -> list[Shown]:
-    """The head of values that do not solve the problem, with the first of them, and the change to try.
+    """The head of values that do not solve the problem, with the first of them, and the change to try."""
+    return [*remedied(finished), Note(first, lead=f"{finished.unfinished.capitalize()}:")]
 
-    A command reports that change on stderr.
-    """
+
+def remedied(finished: Run) -> list[Shown]:
+    """The change that may let a run converge, where no command reports it on stderr."""
     said = "" if finished.remedy is None else f"{finished.remedy.sentence()}."
-    advice: list[Shown] = [Note(said, only=place) for place in ("notebook", "report") if said]
-    return [*advice, Note(first, lead=f"{finished.unfinished.capitalize()}:")]
+    return [Note(said, only=place) for place in ("notebook", "report") if said]
 
 
 def happened(finished: Run, *, alone: bool) -> Section:

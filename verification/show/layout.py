@@ -47,11 +47,11 @@ def text(sections: Iterable[Section]) -> str:
 def _lines(part: Shown, typing: Typing) -> Iterable[str]:
     match part:
         case Facts(about, facts):
-            return _folded(" | ".join(filter(None, (about, *facts))), 0)
+            return folded(" | ".join(filter(None, (about, *facts))), 0)
         case Note(words, indent, lead):
-            return _folded(f"{lead} {words}".lstrip(), indent)
+            return folded(f"{lead} {words}".lstrip(), indent)
         case Labelled(label, words):
-            return _folded(f"{label:{LABEL}}{words}", 2)
+            return folded(f"{label:{LABEL}}{words}", 2)
         case Table():
             return _columns(part)
         case Block(block, indent):
@@ -62,7 +62,8 @@ def _lines(part: Shown, typing: Typing) -> Iterable[str]:
     raise TypeError(f"{type(part).__name__} has no layout")
 
 
-def _folded(words: str, indent: int) -> list[str]:
+def folded(words: str, indent: int) -> list[str]:
+    """Lines of the width of a screen; all but the first are indented by two more columns."""
     return textwrap.wrap(
         words, WIDTH, initial_indent=" " * indent, subsequent_indent=" " * (indent + 2), break_on_hyphens=False
     )

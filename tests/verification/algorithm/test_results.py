@@ -53,7 +53,7 @@ TITLES = {
     "Measured": "WHICH CONSTANTS DOES THE THEOREM USE?",
     "Run": "WHAT HAPPENED",
     "Solution": "WHAT IS THE SOLUTION?",
-    "Comparison": "DOES THE RUN AGREE WITH THE BOUND?",
+    "Comparison": "DOES IT CONVERGE, AND HOW FAST?",
     "Advice": "WHICH BODY GETS THE NEUMANN PROBLEM?",
     "Plane": "WHERE IS ONE STEP PROVED TO CONTRACT?",
 }

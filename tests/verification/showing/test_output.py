@@ -17,7 +17,7 @@ from verification.output.files import FILES, staged
 from verification.output.folder import Folder
 
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
-DRAWN = {"compare.json", "report.html", "waterfall.svg", "waterfall.png"}
+DRAWN = {"compare.json", "report.html", "ruler.svg", "ruler.png", "waterfall.svg", "waterfall.png"}
 TABLES = {"problem.toml", "contact.csv", "history.csv", "sides.csv", "interface.npz"} | {"body1.vtu", "body2.vtu"}
 WRITTEN = {"run": FIGURES | TABLES | {"run.json"}, "comparison": FIGURES | TABLES | DRAWN}
 OURS = WRITTEN["comparison"] - {"problem.toml"}  # that of a user stays as it is
@@ -44,6 +44,7 @@ def quick(monkeypatch):
     """Figures that cost nothing: only their files matter here."""
     monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
     monkeypatch.setattr(figures, "draw_residuals", lambda run, bounds=(): "residuals")
+    monkeypatch.setattr(figures, "draw_ruler", lambda found: "ruler")
     monkeypatch.setattr(figures, "draw_waterfall", lambda losses, unit: "waterfall")
     monkeypatch.setattr(
         figures,

@@ -36,6 +36,7 @@ def drawn(problem, compared):
         "bodies": figures.draw_bodies(compared.run),
         "stresses": figures.draw_bodies(compared.run, stress="mises", motions=True),
         "residuals": figures.draw_residuals(compared.run, compared.computed),
+        "ruler": figures.draw_ruler(compared),
         "losses": figures.draw_waterfall(compared.losses, "MPa"),
         "roles": vf.advise(problem).plot(),
         "squares": figures.draw_squares(Constants(m=1, M=1, C_R=1, C_K="1/10"), [REPAIRED]),

@@ -83,7 +83,7 @@ def test_the_report_asks_no_other_file_and_no_other_host(written):
 
 def test_the_report_holds_its_figures_and_every_verdict_with_its_reason(comparison, written):
     page = read(written)
-    assert page.tags.count("svg") == 3
+    assert page.tags.count("svg") == 4
     for name, judgement in comparison.verdicts.items():
         assert f"{NAMES.get(name, name)}\n" in page.text
         assert WORDS[judgement.verdict] in page.text
@@ -116,7 +116,7 @@ def test_the_report_has_the_words_and_the_digits_of_the_screen(comparison, writt
 def test_every_table_and_figure_of_the_report_has_a_caption(written):
     page = read(written)
     assert page.tags.count("table") == page.tags.count("caption") == 6
-    assert page.tags.count("figure") == page.tags.count("figcaption") == page.tags.count("svg") == 3
+    assert page.tags.count("figure") == page.tags.count("figcaption") == page.tags.count("svg") == 4
 
 
 def test_the_report_explains_every_verdict_and_words_that_the_glossary_has(written):

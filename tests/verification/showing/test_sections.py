@@ -51,8 +51,8 @@ def results(shared) -> dict[str, Document]:
         return {name: make(problem(10)) for name, make in ALL.items()}
 
 
-def terminal(result) -> str:
-    return "\n".join(line for line, _ in lines(result.sections(), "terminal"))
+def terminal(sections) -> str:
+    return "\n".join(line for line, _ in lines(sections, "terminal"))
 
 
 def words(text: str) -> str:
@@ -98,14 +98,19 @@ def test_every_kind_of_result_that_has_sections_is_among_these(results):
 
 def test_a_terminal_and_a_notebook_show_every_title_and_every_number(results):
     for name, result in results.items():
-        view, screen = page_words(result._repr_html_()), words(terminal(result))
-        for place, page in (("notebook", view), ("terminal", screen)):
-            sections = shown(result.sections(), place)
+        first = registry.screen(result)
+        view, screen, full = (
+            page_words(result._repr_html_()),
+            words(terminal(first)),
+            words(terminal(result.sections())),
+        )
+        for place, page, given in (("notebook", view, first), ("terminal", full, result.sections())):
+            sections = shown(given, place)
             assert sections, name
             missing = [found for each in sections for found in texts(each) if found not in page]
             # a cell that is folded in the last column of a table is not in one piece
             assert [found for found in missing if set(found.split()) - set(page.split())] == [], name
-        assert view == " ".join(screen.partition("Next: ")[0].split()), name
+        assert view == " ".join(screen.partition("All numbers: ")[0].partition("Next: ")[0].split()), name
 
 
 @pytest.mark.parametrize("name", ["Comparison", "Comparison with proofs"])
@@ -209,15 +214,25 @@ def test_a_title_that_is_renamed_in_its_one_place_is_renamed_everywhere(results,
     assert places == [ROOT / "sections" / "comparison.py"]
     source = places[0].read_text("utf-8")
     assert source.count(old) == 1
-    before = page_words(report(result, {"residuals": "<svg></svg>"})), page_words(result._repr_html_())
+    pages = lambda: (page_words(report(result, {"residuals": "<svg></svg>"})), words(terminal(result.sections())))
+    before = pages()
     scope: dict = {"__name__": of_comparison.__name__}
-    exec(compile(source.replace(old, new).replace("@registry.sections.register", ""), str(places[0]), "exec"), scope)
+    exec(
+        compile(
+            source.replace(old, new)
+            .replace("@registry.sections.register", "")
+            .replace("@registry.screen.register", ""),
+            str(places[0]),
+            "exec",
+        ),
+        scope,
+    )
     monkeypatch.setattr(of_comparison.verdicts, "__code__", scope["verdicts"].__code__)
-    after = page_words(report(result, {"residuals": "<svg></svg>"})), page_words(result._repr_html_())
+    after = pages()
     assert after == (before[0].replace(old.capitalize(), new.capitalize()), before[1].replace(old, new))
     file = tmp_path / "problem.toml"
     file.write_text(problem(10).to_toml(), encoding="utf-8")
-    assert main(["compare", str(file), "--bounds", "energy"]) == 0
+    assert main(["compare", str(file), "--bounds", "energy", "--full"]) == 0
     assert new in (out := capsys.readouterr().out)
     assert old not in out
 
@@ -269,12 +284,10 @@ def test_a_bound_that_is_registered_is_shown_everywhere(monkeypatch, capsys, tmp
     result = vf.compare(problem(10), bounds=bounds)
     file = tmp_path / "problem.toml"
     file.write_text(problem(10).to_toml(), encoding="utf-8")
-    assert main(["compare", str(file), "--bounds", ",".join(bounds)]) == 0
-    for said in (
-        words(capsys.readouterr().out),
-        page_words(result._repr_html_()),
-        page_words(report(result, NO_FIGURES)),
-    ):
+    assert main(["compare", str(file), "--bounds", ",".join(bounds), "--full"]) == 0
+    for name in bounds:
+        assert f"{name} contracts 0.875 <= 207 consistent" in page_words(result._repr_html_())
+    for said in (words(capsys.readouterr().out), page_words(report(result, NO_FIGURES))):
         for name in bounds:
             assert f"{name} 0.432 0.876 (0, 0.625) 0.875 contracts" in said
             assert f"{name}: of no theorem, in MPa" in said
