@@ -66,7 +66,7 @@ window.nd = (() => {
         this.frame.append(svg("path", { d: `M${this.toX(value)},${bottom}v4`, class: "axis" }),
           svg("text", { x: this.toX(value), y: bottom + 15, "text-anchor": "middle" }, short(value)));
       }
-      for (const value of ticks(y.low, y.high, y.log)) {
+      for (const value of y.bare ? [] : ticks(y.low, y.high, y.log)) {
         this.frame.append(svg("path", { d: `M${left},${this.toY(value)}h-4`, class: "axis" }),
           svg("text", { x: left - 6, y: this.toY(value) + 3.5, "text-anchor": "end" }, short(value)));
       }

@@ -6,7 +6,7 @@ nd.onPage("explore", (figure) => {
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const bodies = data.bodies.map((body) => ({ ...body, lift: new Int16Array(bytes(body.lift).buffer) }));
   const roles = data.roles.map((role) => ({ ...role, frames: new Int8Array(bytes(role.frames).buffer) }));
-  const number = (value) => String(Number(value.toPrecision(4)));
+  const number = (value) => String(Number(value.toPrecision(4))), { short } = nd;
 
   const widget = { name: "explore", sliders: {}, buttons: {}, controls: nd.html("div", { class: "controls" }), update: draw };
   const says = nd.html("p", { class: "answer", "aria-live": "polite" });
@@ -36,7 +36,7 @@ nd.onPage("explore", (figure) => {
     }, 450);
   }
 
-  const panel = (title, ...nodes) => { const div = nd.html("div", {}, nd.html("h3", {}, title), ...nodes); pictures.append(div); return div; };
+  const panel = (title, ...nodes) => { const div = nd.html("div", {}, nd.html("h2", {}, title), ...nodes); pictures.append(div); return div; };
   const stage = nd.svg("svg", { class: "bodies", role: "img", "aria-label": "Both bodies deformed" });
   const stageTitle = panel("", stage).firstChild;
   const legend = nd.html("p", { class: "legend" });
@@ -93,6 +93,7 @@ nd.onPage("explore", (figure) => {
   const margin = 0.12 * size, left = Math.min(...all.map((p) => p[0])) - margin, top = Math.max(...all.map((p) => p[1])) + margin;
   const width = Math.max(...all.map((p) => p[0])) + margin - left, height = top - Math.min(...all.map((p) => p[1])) + margin;
   stage.setAttribute("viewBox", `0 0 1000 ${Math.max(1000 * height / width, 160).toFixed(0)}`);
+  const bar = round(0.25 * size), ground = Number(stage.getAttribute("viewBox").split(" ")[3]) - 8;
   const unit = 1000 / width, X = (x) => ((x - left) * unit).toFixed(1), Y = (y) => ((top - y) * unit).toFixed(1);
   const stresses = roles[0].scales.slice(own.first, own.first + own.shown.length).map((s) => s[1]);
   const arrow = stresses.length && Math.max(...stresses) > 0 ? 0.1 * size / (past ? Math.max(...stresses) : stresses[stresses.length - 1]) : 0;
@@ -126,12 +127,14 @@ nd.onPage("explore", (figure) => {
       }
     });
     now.states.forEach((state, j) => mark(marks, state, ...places[carrier][bodies[carrier].contact[j]].map((v, k) => Number(k ? Y(v) : X(v)))));
-    stage.append(marks);
+    stage.append(marks, nd.svg("path", { d: `M20,${ground}v-8m0,4h${(bar * unit).toFixed(1)}m0,-4v8`, class: "axis" }));
+    const sizes = Math.max(0, ...now.pressure.map((pressure, j) => Math.hypot(pressure, plane ? now.shear[j] : 0)));
     const count = (name) => now.states.filter((state) => state === name).length;
     const frictionless = data.friction[friction.value] === 0;
     legend.textContent = (frictionless ? `Triangles are closed (${count("slip") + count("stick")}), circles open (${count("open")}). `
       : `Squares stick (${count("stick")}), triangles slip (${count("slip")}), circles are open (${count("open")}). `)
-      + `Blue: body 1, orange: body 2; the ${role.name} one is the Neumann body. Displacements times ${scale}.`;
+      + `Blue: body 1, orange: body 2; the ${role.name} one is the Neumann body. Displacements times ${scale}. `
+      + `The bar is ${number(bar)} ${data.units.length} long` + (sizes > 0 ? `, the longest arrow ${number(sizes)} ${data.units.stress}.` : ".");
   }
 
   // Theta, friction and roles: the panels of a run.
@@ -145,7 +148,10 @@ nd.onPage("explore", (figure) => {
       "Circle: converged, the larger the fewer steps; cross: not. Filled region: a bound proves that one step contracts."));
     const factors = new nd.Chart({ width: 360, height: 260, label: "Error per step over theta", x: { low: 0, high: 1, name: "theta" }, y: { low: 0, high: 1.5, name: "error per step" } });
     panel("Error per step at this friction", factors.root, nd.html("p", { class: "legend" },
-      "Points: observed, of runs that converged. Dashed: predicted from rho, not a bound. Line: bound in energy norms, where it applies."));
+      "Points: observed, of runs that converged. Dashed: predicted from rho, not a bound; its least value is marked. Line: bound in energy norms, in doubles, where it applies."));
+    const ruler = new nd.Chart({ width: 360, height: 170, label: "Steps promised, predicted and taken", x: { low: 1, high: 1e4, log: true, name: `steps to ${short(data.tolerance)}` }, y: { low: 0, high: 4, bare: true, name: "" } });
+    panel("How many steps?", ruler.root, nd.html("p", { class: "legend" },
+      "By the best bound at most so many, whatever the loads; as rho predicts them, without friction; as this run took them."));
 
     function drawResiduals(run, i) {
       const seen = run.residuals.filter((r) => r > 0), low = Math.min(data.tolerance / 10, ...seen), high = Math.max(1, ...seen) * 2;
@@ -180,6 +186,8 @@ nd.onPage("explore", (figure) => {
       factors.line([[0, 1], [1, 1]], { stroke: nd.COLOURS.grey, "stroke-width": 1 });
       if (role.rho !== null) {
         factors.line(line.map((t) => [t, f.predictedFactor(t, role.rho)]), { stroke: nd.COLOURS.orange, "stroke-dasharray": "5 3" });
+        factors.line([[role.best, 0], [role.best, f.predictedFactor(role.best, role.rho)]], { stroke: nd.COLOURS.orange, "data-theta": role.best });
+        factors.note(role.best, 1.4, `best ${number(role.best)}`, { "text-anchor": role.best > 0.5 ? "end" : "start" });
         const kappa = role.kappa ? role.kappa.map((each) => each * at) : at === 0 ? [0, 0] : null;
         if (kappa) {
           const proved = line.map((t) => [t, Math.sqrt(Math.max(0, 1 - f.energyOneMinusSquare(t, role.rho, ...kappa)))]);
@@ -189,18 +197,34 @@ nd.onPage("explore", (figure) => {
       role.runs[k].forEach((run, t) => { if (run.rate !== null && run.outcome === "converged") factors.dot(data.theta[t], run.rate, { fill: nd.COLOURS.blue, r: t === theta.value ? 6 : 3 }); });
     }
 
+    // Steps to the tolerance, on one axis: a bar for each number that there is.
+    function drawRuler(role, run, best) {
+      const t = data.theta[theta.value], to = (factor) => (factor < 1 ? Math.ceil(Math.log(data.tolerance) / Math.log(factor) - 1e-9) : null);
+      const found = [["promised", best ? to(best[1]) : null, nd.COLOURS.green], ["predicted", role.rho === null ? null : to(f.predictedFactor(t, role.rho)), nd.COLOURS.orange],
+        ["taken", run.outcome === "converged" ? run.steps : null, nd.COLOURS.blue]];
+      ruler.axes({ ...ruler.x, high: Math.max(1e3, ...found.map(([, steps]) => 20 * (steps ?? 1))) }, ruler.y);
+      ruler.clear();
+      found.forEach(([name, steps, stroke], j) => {
+        const y = 3.3 - j;
+        if (steps !== null) { ruler.line([[1, y], [steps, y]], { stroke }); ruler.dot(steps, y, { fill: stroke, "data-steps": name }); }
+        ruler.note(steps === null ? 1.2 : 1.25 * steps, y - 0.12, steps === null ? `${name}: none` : `${name}${j ? "" : " at most"} ${steps}`);
+      });
+      return found[0][1];
+    }
+
     return (role, run, i) => {
       const k = friction.value, last = run.shown.length - 1;
       const best = data.bounds.map(({ name }, b) => [name, run.factors[b]]).filter(([, factor]) => factor !== null).sort((a, b) => a[1] - b[1])[0];
       const rate = run.rate === null || run.outcome !== "converged" ? "" : `, each leaving ${number(run.rate)} of the error`;
       says.textContent = `theta = ${number(data.theta[theta.value])}, k = ${number(data.friction[k])}, Neumann body ${role.neumann} (${role.name}): ${ended(run)}${rate}. `
-        + (best ? `Bound for any loads (${best[0]}, in doubles): at most ${number(best[1])} of the error is left by a step.` : "No bound proves that a step contracts here.")
+        + (best ? `For any loads a step leaves at most ${number(best[1])} of the error, so that at most ${drawRuler(role, run, best)} steps are needed.` : "No bound says that a step contracts here.")
         + (run.leftOut ? ` The bodies leave the picture: ${run.leftOut} of ${run.leftOut + run.shown.length} drawings of this run are left out.` : "");
       stageTitle.textContent = last < 0 ? "The bodies" : `The bodies at step ${run.shown[i]}`;
       stepText.textContent = last < 0 ? "none" : `${run.shown[i]} of ${run.steps}`;
       drawResiduals(run, i);
       drawMap(role);
       drawFactors(role, k);
+      if (!best) drawRuler(role, run, best);
       nd.fill(table, ["step", "relative residual"], run.residuals.map((r, s) => [s, r === null ? "too large for a number" : nd.digits(r)]));
     };
   }

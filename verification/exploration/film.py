@@ -31,6 +31,9 @@ VISIBLE = 1e-3
 #: Number of first steps at which they are all drawn, and of steps of one run at most.
 FIRST, MOST = 10, 20
 
+#: Number of last steps that are drawn where the residual stays visible, as in a cycle.
+LAST = 6
+
 #: Bodies are not drawn at steps in which a displacement is larger than this multiple of the largest one of the
 #: problem's own run: they leave the picture.
 FARTHEST = 10.0
@@ -187,13 +190,16 @@ def told(history: History) -> dict[str, Any]:
 def steps_shown(history: Sequence[float]) -> list[int]:
     """The steps at which bodies are drawn: the first ones, ever fewer while the residual is visible, the last one.
 
-    >>> steps_shown([1, 0.1, 1e-2, 1e-4, 1e-6, 1e-9])
-    [0, 1, 2, 3, 5]
+    Where it stays visible, the last ones, among which a cycle shows.
+
+    >>> steps_shown([1, 0.1, 1e-2, 1e-4, 1e-6, 1e-9]), steps_shown([0.5] * 40)[-7:]
+    ([0, 1, 2, 3, 5], [33, 34, 35, 36, 37, 38, 39])
     """
     last = len(history) - 1
     visible = next((i for i, residual in enumerate(history) if residual <= VISIBLE), last)
     later = np.geomspace(FIRST, visible, MOST - FIRST) if visible > FIRST else np.zeros(0)
-    return sorted({*range(min(visible, FIRST) + 1), *(int(step) for step in later), last})
+    cycle = range(max(last - LAST, 0), last) if visible == last else ()
+    return sorted({*range(min(visible, FIRST) + 1), *(int(step) for step in later), *cycle, last})
 
 
 def packed(found: Film) -> dict[str, Any]:

@@ -36,6 +36,9 @@ from verification.registry import BOUNDS
 SHARES = tuple(Fraction(n, 4) for n in (0, 2, 4, 6, 8))
 FRICTIONS = tuple(Fraction(n, 10) for n in (0, 1, 2, 4))
 
+#: Thetas of the grid; none is run at a distance below APART from the problem's own or a predicted one.
+THETAS, APART = tuple(Fraction(n, 20) for n in range(1, 20)), Fraction(1, 50)
+
 #: The largest theta of the grid in three digits.
 CLOSEST_TO_ONE = 0.999
 
@@ -144,6 +147,7 @@ class Exploration(Document):
             "contactNodes": found.pair.contact.grid.n,
             "normals": found.pair.contact.grid.upright.round(6).tolist(),
             "rho": None if energy is None else float(energy.rho),
+            "best": None if energy is None else float(predicted_theta(float(energy.rho))),
             "kappa": [float(energy.kappa_1) / k, float(energy.kappa_2) / k] if per_friction and energy else None,
             "regions": [_corners(found.regions.get(name)) for name in self._bounds],
             "whyNoRegion": found.why_no_region,
@@ -196,7 +200,7 @@ def explore(
     --------
     >>> from verification.problem.examples import example
     >>> explore(example("two-bars"))
-    <Exploration: Two bars, 40 runs at 20 thetas and 1 frictions>
+    <Exploration: Two bars, 38 runs at 19 thetas and 1 frictions>
     """
     given = problem if isinstance(problem, Problem | ContactPair) else load(problem)
     whole = given.problem if isinstance(given, ContactPair) else given
@@ -222,8 +226,9 @@ def _grid(pair: ContactPair, problem: Problem, progress: Progress) -> Exploratio
         why = str(error)
     measured = [measure(each) for each in pairs]
     rhos = [one.rho_max for one in measured if one.rho_max is not None]
-    predicted = (Fraction(f"{min(float(predicted_theta(rho.value)), CLOSEST_TO_ONE):.3g}") for rho in rhos)
-    thetas = tuple(sorted({made.theta, *predicted, *(Fraction(n, 20) for n in range(1, 20))}))
+    first = {made.theta}
+    first |= {Fraction(f"{min(float(predicted_theta(rho.value)), CLOSEST_TO_ONE):.3g}") for rho in rhos}
+    thetas = tuple(sorted({*first, *(theta for theta in THETAS if all(abs(theta - each) >= APART for each in first))}))
     frictions = _frictions(pair)
     films = [
         film(each, constants, thetas, frictions, farthest, _part(progress, i, len(pairs)))

@@ -67,6 +67,9 @@ def test_the_grid_has_the_problems_own_theta_and_friction_and_the_predicted_thet
     assert found.frictions[found.own[1]] == found.problem.contact.friction
     for role in vf.advise(found.problem).roles:
         assert min(abs(float(theta) / role.theta_predicted - 1) for theta in found.thetas) < 0.005
+    first = [each for each in found.thetas if each not in page.THETAS] + [Fraction(found.problem.iteration.theta)]
+    others = [each for each in found.thetas if each not in first]
+    assert min(abs(each - one) for each in others for one in first) >= page.APART
 
 
 def test_each_position_is_a_run(found, data):
