@@ -17,9 +17,9 @@ COLOURS = {"blue": "#0072b2", "red": "#d55e00", "green": "#009e73", "orange": "#
 WORDS = 7
 
 
-def axis(name: str, low: float, high: float, *, log: bool = False) -> dict[str, Any]:
-    """An axis of a chart; with ``log`` a logarithmic one."""
-    return {"name": name, "low": low, "high": high, "log": log}
+def axis(name: str, low: float, high: float, *, log: bool = False, bare: bool = False) -> dict[str, Any]:
+    """An axis of a chart; with ``log`` a logarithmic one, ``bare`` without numbers."""
+    return {"name": name, "low": low, "high": high, "log": log, **({"bare": True} if bare else {})}
 
 
 def line(points: Iterable[Sequence[float]], colour: str = "blue", *, dashed: bool = False) -> dict[str, Any]:
@@ -111,6 +111,8 @@ def still(data: Mapping[str, Any]) -> Figure:
             ax.set(xlabel=x["name"], ylabel=y["name"], title=chart["label"])
             ax.set(xscale="log" if x["log"] else "linear", yscale="log" if y["log"] else "linear")
             ax.set(xlim=(x["low"], x["high"]), ylim=(y["low"], y["high"]))
+            if y.get("bare"):
+                ax.set_yticks([])
             for mark in [*chart["fixed"], *marks]:
                 _draw(ax, mark)
     return figure

@@ -255,7 +255,7 @@ WIDGETS = {
     ),
     **{
         page: Widget(label=module.LABEL, data=module.data, still=scenes.still, script="scenes")
-        for page, module in ((page, questions.of(page)) for page in questions.PAGES)
+        for page, module in ((page, questions.of(page)) for page in (*questions.PAGES, *questions.FURTHER))
     },
 }
 

@@ -63,7 +63,10 @@ def unanswered(driver, page):
 @pytest.fixture
 def browser(driver, page, builder):
     """The page with an address that holds a state of each widget, so that no question is asked."""
-    first = {name: builder.questions.of(name).data()["sliders"][0] for name in builder.questions.PAGES}
+    first = {
+        name: builder.questions.of(name).data()["sliders"][0]
+        for name in (*builder.questions.PAGES, *builder.questions.FURTHER)
+    }
     states = [f"{name}.{slider['name']}={slider['start']}" for name, slider in first.items()]
     driver.get("about:blank")
     driver.get(f"{page.as_uri()}#{'&'.join(['cobweb.theta=1', 'plane.unit=0', 'spectrum.step=0', *states])}")

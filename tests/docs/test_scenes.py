@@ -30,13 +30,14 @@ SCENES = sorted(path.stem for path in (DOCS / "builder" / "questions").glob("[!_
 
 
 def test_all_questions_are_listed(builder):
-    assert sorted(builder.questions.PAGES) == SCENES
+    assert sorted((*builder.questions.PAGES, *builder.questions.FURTHER)) == SCENES
 
 
-def test_a_page_asks_its_question_before_its_first_section():
+def test_a_page_asks_its_question_before_its_first_section(builder):
     for name in SCENES:
-        introduction = (DOCS / "examples" / f"{name}.md").read_text("utf-8").partition("\n## ")[0]
-        assert f"```{{widget}} {name}\n" in introduction
+        page = builder.questions.FURTHER.get(name, name)
+        introduction, _, rest = (DOCS / "examples" / f"{page}.md").read_text("utf-8").partition("\n## ")
+        assert f"```{{widget}} {name}\n" in (introduction if page == name else rest)
 
 
 def test_the_right_answer_is_found_neither_by_its_length_nor_by_its_place(builder):
@@ -241,6 +242,24 @@ def test_the_node_with_friction_has_the_solutions_of_the_picture_and_its_runs_en
     assert exact_solutions(Fraction(36, 9)) == {"open", "slip", "stick"}
     measured = vf.measure(asked.node(4))
     assert f"Below k = {measured.friction_limit.value:.2f} it is proved" in data["why"]
+
+
+def test_the_ruler_has_the_steps_of_comparisons_and_powers_of_the_factors(builder):
+    """A comparison at one place, whose promises are counted by multiplying; the sentence of the answer at another."""
+    asked = builder.questions.of("ruler")
+    problem = vf.example("section6").changed(cells=((20, 3), (12, 3)), theta="0.7", friction="0.2")
+    found, ours = vf.compare(problem), asked.marks()["0.7", "0.2"]
+    for name in ("energy", "lmi"):
+        factor, count = Fraction(found.bounds[name].factor.value), ours[name]
+        assert factor**count <= Fraction(1, 10**9) < factor ** (count - 1)
+    assert (ours["printed"], ours["repaired"], ours["run"]) == (None, None, found.run.iterations)
+    for each in asked.marks().values():
+        promised = [each[name] for name in ("printed", "repaired", "energy", "lmi") if each[name]]
+        assert promised == sorted(promised, reverse=True)
+        assert each["run"] is None or not promised or each["run"] <= promised[-1]
+    tiny = asked.marks()["3.4e-11", "1e-22"]
+    assert 5e11 < tiny["printed"] < 8e11 < 1e8 * tiny["printed"]
+    assert asked.data()["right"] == f"{tiny['printed'] / 1e9:.0f} thousand million"
 
 
 @pytest.mark.parametrize("swapped", [False, True])

@@ -13,6 +13,9 @@ PAGES = (
     *("grids", "constant_theta", "best_theta", "beyond_constant", "other_code"),
 )
 
+#: Questions further down on a page, by name, with their page.
+FURTHER = {"ruler": "theorem_and_experiment"}
+
 
 def of(page: str) -> ModuleType:
     """The module of a page."""
