@@ -8,6 +8,7 @@ from browser import needs_browser
 from widget_page import frame, move, rows, says
 
 import verification as vf
+from ndtheory import bounds as editions
 from ndtheory.statements import statements
 from verification.figures.proof_map import PRINTED, STEPS
 from verification.semidefinite.losses import locate
@@ -39,6 +40,37 @@ def of_the_library(at):
     moduli = (at["ratio"] * 20000 / at["unit"], 20000 / at["unit"])
     problem = vf.example("section6").changed(young=tuple(map(repr, moduli)), friction=repr(at["k"]))
     return locate(vf.build(problem), vf.measure(problem))
+
+
+def test_a_broken_proof_has_the_thresholds_of_both_editions_and_a_friction_term_of_1_where_it_ends(builder):
+    """Sets of steps without their losses: from the printed edition to the repaired one, and on by the losses alone."""
+    found, (losses, _) = builder.widgets.broken(), builder.widgets.searched()
+    measured = vf.measure(vf.example("section6"))
+    *links, unit = (loss.label for loss in losses.friction)
+    for labels, edition in (("", editions.PRINTED), (unit, editions.REPAIRED)):
+        assert found[labels] == pytest.approx(editions.evaluate(edition, measured.constants()).C4.value, rel=1e-9)
+    m, M, C_R = (getattr(measured, name).value for name in ("m", "M", "C_R"))
+    for labels in ([unit], [*links, unit], [links[0], links[3], unit]):
+        lost = sum(loss.decades for loss in losses.friction if loss.label in labels and not loss.only_unit)
+        x = found[" ".join(labels)] * measured.C_s.value * measured.C_tr.value
+        assert editions.P(x, m, M, C_R, m) / 10**lost == pytest.approx(1, rel=1e-9)
+    assert len(found) == 2 ** len(losses.friction)
+    assert min(found, key=found.get) == ""
+    assert max(found, key=found.get) == " ".join([*links, unit])
+    assert found[" ".join([*links, unit])] < measured.friction_threshold.value
+
+
+@needs_browser
+def test_a_button_takes_the_loss_of_a_step_away_and_says_the_threshold(browser, builder):
+    found, (losses, _) = builder.widgets.broken(), builder.widgets.searched()
+    label = losses.friction[0].label
+    frame(browser, "chain").find_element("css selector", "[name=without0]").click()
+    words = frame(browser, "chain").find_element("css selector", ".broke").text
+    assert f"without the loss of {label} it would be k < " in words
+    threshold = float(words.partition("it would be k < ")[2].split(" ")[0].rstrip("."))
+    assert threshold == pytest.approx(found[label], rel=1e-3)
+    edge = next(" ".join(edge) for edge, (_, labels) in STEPS.items() if labels == (label,))
+    assert decades(browser)[0][edge] == 0
 
 
 def expected(losses, step):
