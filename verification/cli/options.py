@@ -76,7 +76,8 @@ RELAXATION = click.option(
     "--relaxation",
     type=Registered(_rules),
     metavar="RULE",  # a list of the names would import the rules, and arrays with them
-    help="Rule of relaxation, instead of the file's; all but constant are outside the theorem. A wrong name lists all.",
+    help="Rule of relaxation, instead of the file's: one of constant, aitken, anderson, iqn-ils, newton, momentum or a "
+    "registered one; all but constant are outside the theorem.",
 )
 
 
@@ -93,7 +94,8 @@ BOUNDS = click.option(
     "--bounds",
     callback=_bounds,
     metavar="NAMES",
-    help="Only these bounds, as printed,repaired,energy; all but lyapunov by default, and without lmi it is fast.",
+    help="Only these bounds, of printed,repaired,energy,lmi,lyapunov and registered ones; all but lyapunov by default, "
+    "and without lmi it is fast.",
 )
 
 FULL = click.option("--full", is_flag=True, help="Show all numbers; the first screen has 15 lines.")

@@ -373,7 +373,7 @@ def couple(
     Raises
     ------
     ValueError
-        As :class:`Coupling`; a start, a tolerance or a number of iterations that is none.
+        As :class:`Coupling`; ``start``, ``tolerance`` or ``max_iterations`` is invalid.
     CouplingError
         A solver returned numbers that are not finite, or not as many as the start has.
 

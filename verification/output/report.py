@@ -18,7 +18,7 @@ GLOSSARY = {
     "one is the contact body.",
     "theta": "The relaxation factor: the next forces are theta times the new ones plus 1 - theta times the old ones.",
     "rho": "The largest stiffness of the contact body relative to the Neumann body, over all shapes of Gamma_c.",
-    "edition": "A form of the theorem with the constants of this mesh. Printed: the paper's, letter by letter. "
+    "edition": "A form of the theorem with the constants of this mesh. Printed: exactly as published. "
     "Repaired: with the factor 1/m that (5.30) lost.",
     "energy": "The same proof in energy norms.",
     "lmi": "The bound by semidefinite programs, from the conditions of contact and friction node by node. Its "

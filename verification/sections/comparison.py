@@ -135,8 +135,8 @@ class Parts(Listener):
             total = sum(loss.decades for loss in estimates)
             unit = sum(loss.decades for loss in friction) - total
             links = ", ".join(f"10^{loss.decades:.1f} by {loss.label}" for loss in estimates)
-            sizes = f"10^{total:.1f} times what was found (printed 10^{total + unit:.1f})"
-            parts.append(f"(5.30), the friction bound, is {sizes}: {links}.")
+            sizes = f"10^{total:.1f} (printed: by 10^{total + unit:.1f})"
+            parts.append(f"The friction bound (5.30) exceeds the largest friction term found by {sizes}: {links}.")
         if parts:
             self.show((section("losses", "HOW MUCH DOES EACH ESTIMATE LOSE?", *parts, pictures=WATERFALL),))
 
