@@ -13,7 +13,7 @@ from processes import ended
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.cli.sweeping import every
+from verification.cli.console import every
 from verification.sweeps import workers
 from verification.sweeps.grid import read_sweep
 from verification.sweeps.store import plan

@@ -90,7 +90,7 @@ def observed_rate(pair: ContactPair, iterates: Sequence[Iterate]) -> ObservedRat
 
 
 def rate_of(residuals: Sequence[float], floors: Sequence[float], patterns: Sequence[object]) -> ObservedRate | None:
-    """Estimate the rate from the residuals, the noise of each, and contact patterns of any type that can be compared."""
+    """Estimate the rate from residuals, the noise of each, and contact patterns of any type that can be compared."""
     clear = [residual > CLEAR_OF_NOISE * floor for residual, floor in zip(residuals, floors, strict=True)]
     count = clear.index(False) if False in clear else len(clear)
     if count < 3:

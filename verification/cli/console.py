@@ -9,6 +9,7 @@ import io
 import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TextIO, TypeVar
@@ -253,6 +254,46 @@ def stages() -> Iterator[Progress]:
 
 
 @contextlib.contextmanager
+def long_stages(log: Path | None = None) -> Iterator[Progress]:
+    """The stages of a long command: a live line on a terminal, lines with the time in a log and on another stderr."""
+    with contextlib.ExitStack() as stack:
+        tellers = [stack.enter_context(stages())]
+        if log is not None:
+            stream = stack.enter_context(log.open("a", encoding="utf-8"))
+
+            def write(line: str) -> None:
+                with contextlib.suppress(OSError):  # a full disk: the rows matter more
+                    stream.write(printable(line) + "\n")
+                    stream.flush()
+
+            tellers.append(every(IN_LOG, write, at_once=True))
+        elif not sys.stderr.isatty():
+            tellers.append(every(ON_STDERR, complain))
+
+        def tell(what: str, share: float | None) -> None:
+            for each in tellers:
+                each(what, share)
+
+        yield tell
+
+
+def every(
+    seconds: float, write: Callable[[str], None], *, at_once: bool = False, clock: Callable[[], float] = time.monotonic
+) -> Progress:
+    """Progress as lines, at most one in so many seconds; with ``at_once`` the first and the last one too."""
+    last = clock() - seconds if at_once else clock()
+
+    def tell(what: str, share: float | None) -> None:
+        nonlocal last
+        now = clock()
+        if now - last >= seconds or (at_once and share == 1):
+            last = now
+            write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {what}")
+
+    return tell
+
+
+@contextlib.contextmanager
 def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[Iterate], None]]:
     """Report how far the residual has fallen towards its tolerance."""
 
@@ -263,6 +304,9 @@ def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[Iterate], N
 
     yield watch
 
+
+#: Seconds between two lines about progress, in a log and on an stderr that is no terminal.
+IN_LOG, ON_STDERR = 10, 60
 
 #: The key of the problem in the context of a command.
 PROBLEM = "ndtheory.problem"

@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
-import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from ndtheory.texts import printable
-from verification.cli.console import complain, deliver, stages, warn
+from verification.cli.console import complain, deliver, long_stages, stages, warn
 from verification.cli.forms import cli
 from verification.cli.options import BOUNDS, FILE, FOLDER, JOBS, JSON, PATH, STORE, SWAP, Typed, of_a_file, one_file
 from verification.cli.problems import load
+from verification.machine.interrupts import term_interrupts
 from verification.problem.tables import ProblemError, unreadable
 
 if TYPE_CHECKING:
-    from verification.machine.progress import Progress
     from verification.sweeps.sweep import Sweep
 
-
-#: Seconds between two lines about progress: in a log file, and on a stderr that is not a terminal.
-IN_LOG, ON_STDERR = 10, 60
 
 #: The beginning of a log of a sweep, and its largest size.
 LOG = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d runs: \d+ done, ")
@@ -122,7 +115,7 @@ def sweep(
     for one in targets:
         check_folder(one.parent, " (--export)" if one.parent == export else " (-o)")
         check_ours(one)
-    with _progress(log) as tell:
+    with long_stages(log) as tell, term_interrupts():
         work = work_of(jobs or -1, dask)
         found = sweep_grid(problem, grid, work=work, store=kept, fresh=fresh, retry=retry, progress=tell)
     warn(found.notes, "", wide=True)
@@ -195,46 +188,6 @@ def _is_log(path: Path) -> bool:
     with path.open("rb") as there:
         first = there.readline(200)
     return not first or bool(LOG.match(first))
-
-
-@contextlib.contextmanager
-def _progress(log: Path | None) -> Iterator[Progress]:
-    """Progress as one live line on a terminal, as lines with the time in a log and on another stderr."""
-    with contextlib.ExitStack() as stack:
-        tellers = [stack.enter_context(stages())]
-        if log is not None:
-            stream = stack.enter_context(log.open("a", encoding="utf-8"))
-
-            def write(line: str) -> None:
-                with contextlib.suppress(OSError):  # a full disk: the rows matter more
-                    stream.write(printable(line) + "\n")
-                    stream.flush()
-
-            tellers.append(every(IN_LOG, write, at_once=True))
-        elif not sys.stderr.isatty():
-            tellers.append(every(ON_STDERR, complain))
-
-        def tell(what: str, share: float | None) -> None:
-            for each in tellers:
-                each(what, share)
-
-        yield tell
-
-
-def every(
-    seconds: float, write: Callable[[str], None], *, at_once: bool = False, clock: Callable[[], float] = time.monotonic
-) -> Progress:
-    """Progress as lines, at most one in so many seconds; with ``at_once`` the first and the last one too."""
-    last = clock() - seconds if at_once else clock()
-
-    def tell(what: str, share: float | None) -> None:
-        nonlocal last
-        now = clock()
-        if now - last >= seconds or (at_once and share == 1):
-            last = now
-            write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {what}")
-
-    return tell
 
 
 @cli.command()

@@ -71,6 +71,26 @@ class _Ended(BaseException):
 
 
 @contextlib.contextmanager
+def term_interrupts() -> Iterator[None]:
+    """Return a context in which SIGTERM is Ctrl-C, as batch systems send it before the time of a job is over.
+
+    Only in the main thread, and where a program has no handler.
+    """
+    ours = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    if ours:
+        signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        if ours:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+@contextlib.contextmanager
 def in_time(seconds: float) -> Iterator[None]:
     """Return a context that a TimeoutError ends after so many seconds of processor time.
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Mapping, Sequence
+import time
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -30,10 +32,13 @@ from verification.reproduce.claims import (
 from verification.reproduce.readings import READINGS, ModelReading
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import FAILED, Row
-from verification.sweeps.sweep import sweep_grid
+from verification.sweeps.sweep import duration, sweep_grid
 from verification.sweeps.workers import Placed, Work, work_of
 
 FIGURES = tuple(CLAIMS)
+
+#: Seconds before a time to go is estimated.
+FIRST_ESTIMATE = 2.0
 
 #: 0.05 to 0.95.
 THETAS = tuple(f"{n / 20:.2f}" for n in range(1, 20))
@@ -165,7 +170,7 @@ def reproduce(
     store : path, optional
         A file that keeps the runs, and has those that were made before.  Figure 5 has no run: it is solved anew.
     progress : callable
-        Receives the name of what is run, and the share that is done.
+        Receives the figure with the number of rows that are done, and their share.
 
     Raises
     ------
@@ -177,18 +182,37 @@ def reproduce(
             raise ValueError(f"no figure {name!r}; there are {', '.join(CLAIMS)}")
     outcomes: dict[str, list[Outcome]] = {name: [] for name in figures}
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in figures}
-    done, total = 0, len(outcomes) * len(readings)
+    tell = _counted(progress, len(readings) * sum(map(size_of, outcomes)))
+    done = 0
     for reading in readings:
         work = shared(work_of(jobs), reading.problem(60))
         for name in outcomes:
-            progress(f"{name}: {reading.name}", done / total)
-            outcome, behind = _zones(reading) if name == "fig5" else _curves(name, reading, work, store)
+            now = partial(tell, name, done, size_of(name))
+            now("", 0.0)
+            outcome, behind = _zones(reading) if name == "fig5" else _curves(name, reading, work, store, now)
             outcomes[name].append(outcome)
             rows[name] += [{"reading": reading.name, **row} for row in behind]
-            done += 1
+            done += size_of(name)
     return Reproduction(
         results=tuple(Result(figure=name, outcomes=tuple(outcomes[name]), rows=tuple(rows[name])) for name in figures)
     )
+
+
+def size_of(figure: str) -> int:
+    """The number of rows of a figure in one reading; Figure 5 counts as one."""
+    return 1 if figure == "fig5" else len(THETAS) * math.prod(map(len, CLAIMS[figure].axes.values()))
+
+
+def _counted(progress: Progress, total: int) -> Callable[[str, int, int, str, float | None], None]:
+    """Progress by rows, with the time to go after the first ones that took any."""
+    begun = time.monotonic()
+
+    def tell(figure: str, before: int, size: int, what: str, share: float | None) -> None:
+        done, passed = before + size * (share or 0.0), time.monotonic() - begun
+        left = f", {duration(passed * (total - done) / done)} to go" if done and passed > FIRST_ESTIMATE else ""
+        progress(f"{figure}: row {done:.0f} of {total}{left}", done / total)
+
+    return tell
 
 
 def _zones(reading: ModelReading) -> tuple[Outcome, list[dict[str, Any]]]:
@@ -227,11 +251,13 @@ def shared(work: Work, problem: Problem) -> Work:
     return made
 
 
-def _curves(name: str, reading: ModelReading, work: Work, store: Path | None) -> tuple[Outcome, list[dict[str, Any]]]:
+def _curves(
+    name: str, reading: ModelReading, work: Work, store: Path | None, progress: Progress
+) -> tuple[Outcome, list[dict[str, Any]]]:
     """A figure of steps over theta."""
     claim = CLAIMS[name]
     grid = SweepGrid.of({**claim.axes, "theta": THETAS})
-    found = sweep_grid(reading.problem(60), grid, work=work, store=store)
+    found = sweep_grid(reading.problem(60), grid, work=work, store=store, progress=progress)
     if found.interrupted:
         raise KeyboardInterrupt
     rows = [dict(row) for row in found.rows]

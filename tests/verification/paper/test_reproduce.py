@@ -2,6 +2,7 @@
 
 import csv
 import math
+import signal
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.interface.assembly import discretise
 from verification.interface.fields import ContactFields
+from verification.machine.interrupts import term_interrupts
 from verification.output.folder import Folder
 from verification.reproduce import FIGURES, READINGS, reproduce
 from verification.reproduce.claims import CLAIMS, OPTIMUM, Curve, curves_hold, share_as_printed, zones, zones_hold
@@ -297,11 +299,24 @@ def test_unknown_figures_are_refused_and_every_claim_says_when_it_holds():
     assert all(claim.says and claim.criterion for claim in CLAIMS.values())
 
 
-def test_with_a_store_a_figure_is_drawn_again_without_a_run(tmp_path, monkeypatch):
+def test_an_interrupted_figure_goes_on_and_a_whole_one_is_drawn_again_without_a_run(tmp_path, monkeypatch):
     from verification.sweeps import workers
 
-    place = tmp_path / "runs.sqlite"
-    first = reproduce(["fig11"], readings=[CLAMPED], store=place)
+    place, told = tmp_path / "runs.sqlite", []
+
+    def until_row_20(what, share):
+        told.append((what, share))
+        if what == "fig11: row 20 of 57":
+            signal.raise_signal(signal.SIGTERM)
+
+    with pytest.raises(KeyboardInterrupt), term_interrupts():
+        reproduce(["fig11"], readings=[CLAMPED], store=place, progress=until_row_20)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert told[-1] == ("fig11: row 20 of 57", 20 / 57)
+    begins = []
+    first = reproduce(["fig11"], readings=[CLAMPED], store=place, progress=lambda what, share: begins.append(what))
+    assert begins[:2] == ["fig11: row 0 of 57", "fig11: row 20 of 57"]
+    assert begins[-1].startswith("fig11: row 57 of 57")
     monkeypatch.setattr(workers, "row", None)
     again = reproduce(["fig11"], readings=[CLAMPED], store=place)
     assert [result.rows for result in again.results] == [result.rows for result in first.results]
