@@ -18,8 +18,8 @@ import hashlib
 import json
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from itertools import accumulate, pairwise
+from collections.abc import Callable, Iterator, Sequence
+from itertools import accumulate, pairwise, product
 from typing import Any, NamedTuple
 
 from flint import arb, arb_mat, ctx, fmpq
@@ -27,18 +27,15 @@ from flint import arb, arb_mat, ctx, fmpq
 #: What a certificate that is none, or proves nothing, raises.
 UNREADABLE = (OSError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError, RecursionError, MemoryError)
 
-#: Unknowns eliminated at once, and those whose effect on the contact nodes is added up at once.
-BLOCK, BATCH = 32, 128
+BLOCK = 32  # unknowns eliminated at once
+ALONG_AXES = ((1, 0), (0, 1))  # tangent and normal of a node that has no normal of its own
 
 Json = Any  # a part of the file
+Vector = Sequence[Any]  # in the plane; or the coefficients of a linear form
 Unknown = tuple[int, int]  # a node and a component: 0 and 1 are x and y, at a contact node tangent and normal
-Rows = dict[Any, dict[Unknown, Any]]  # of a sparse matrix
-Form = list[Any]  # the coefficients of a linear form
+Rows = dict[Unknown, dict[Unknown, Any]]  # of a sparse matrix
+Product = tuple[fmpq, Vector, Vector]  # a multiplier and the two linear forms whose product it multiplies
 Cases = tuple[tuple[str, int, int, Any], ...]  # kind of division, contact node, 1 or -1, and the sign of the node
-
-
-dot: Callable[[Any, Any], Any] = lambda u, v: u[0] * v[0] + u[1] * v[1]
-close: Callable[[Any, Any, Any], bool] = lambda one, other, size: bool(abs(one - other) < size / 10**6)
 
 
 class Refused(ValueError):
@@ -62,9 +59,9 @@ def check(discrete: Json, claim: Json, eliminated: Callable[..., arb_mat] | None
     demand("radius" not in claim or kernel_is_hat(discrete, claim["radius"]), "as kernel the hat of the radius claimed")
     claimed = margin(steps, theta, factor, norm(steps, claim.get("norm")))
     for leaf, cases in leaves(claim["multipliers"]):
-        values, left, right = zip(*inequalities(steps, leaf), *equations(steps, leaf, cases), strict=True)
-        weighted = arb_mat([[arb(value) * x for x in form] for value, form in zip(values, right, strict=True)])
-        total = arb_mat(left).transpose() * weighted
+        products = [*inequalities(steps, leaf), *equations(steps, leaf, cases)]
+        left = arb_mat([form for _, form, _ in products])
+        total = left.transpose() * arb_mat([[value * x for x in form] for value, _, form in products])
         exceeds = positive_definite(claimed - (total + total.transpose()) / 2)
         demand(exceeds, "multipliers that prove it in balls of these bits")
 
@@ -77,23 +74,20 @@ def surface_stiffness(body: Json, both: bool) -> arb_mat:
     """
     rows, order = stiffness(body)
     keep = [(node, p) for p in ((0, 1) if both else (1,)) for node in body["surface"]]
-    kept, used, answers = set(keep), Rows(), Rows()
+    kept, answers = set(keep), Rows()
     demand(len(kept) == len(keep) and kept <= set(rows), "contact nodes that are free, each once")
     inside = [unknown for unknown in order if unknown not in kept]
     for start in range(0, len(inside), BLOCK):
-        block = inside[start : start + BLOCK]
-        near = {j for i in block for j in rows[i] if j in rows} - set(block)
-        front, beside = sorted(near - kept), [*sorted(near - kept), *sorted(near & kept)]
+        block, ahead = inside[start : start + BLOCK], set(inside[start + BLOCK :])
+        near = {j for i in block for j in rows[i]}
+        front, beside = sorted(near & ahead), [*sorted(near & ahead), *sorted(near & kept)]
         # for so few unknowns radii grow less from block to block by this method than by default
-        solved = gathered(rows, block, block).solve(gathered(rows, block, beside), algorithm="lu")
-        subtract(rows, front, beside, gathered(rows, block, front).transpose() * solved)
-        answers |= {i: dict(zip(beside, line, strict=True)) for i, line in zip(block, solved.tolist(), strict=True)}
-        used |= {i: rows.pop(i) for i in block}
-        if len(used) >= BATCH or start + BLOCK >= len(inside):  # one large product takes half of the time of several
-            met = [j for j in keep if any(j in row for row in used.values())]
-            subtract(rows, met, met, gathered(used, used, met).transpose() * gathered(answers, used, met))
-            used, answers = Rows(), Rows()
-    return gathered(rows, keep, keep)
+        solved = entries(rows, block, block).solve(entries(rows, block, beside), algorithm="lu")
+        answers.update((i, dict(zip(beside, row, strict=True))) for i, row in zip(block, solved.tolist(), strict=True))
+        left = entries(rows, front, beside) - entries(rows, block, front).transpose() * solved
+        for i, row in zip(front, left.tolist(), strict=True):
+            rows[i].update(zip(beside, row, strict=True))
+    return entries(rows, keep, keep) - entries(rows, inside, keep).transpose() * entries(answers, inside, keep)
 
 
 def stiffness(body: Json) -> tuple[Rows, list[Unknown]]:
@@ -106,33 +100,32 @@ def stiffness(body: Json) -> tuple[Rows, list[Unknown]]:
     young, nu = rational(body["young"]), rational(body["poisson"])
     demand(young > 0 and -1 < nu < fmpq(1, 2), "E > 0 and -1 < nu < 1/2")
     lame_lambda, lame_mu = young * nu / ((1 - 2 * nu) * (1 + nu)), young / (2 * (1 + nu))
-    held, upright = {(node, p) for node, p in body["held"]}, ((1, 0), (0, 1))
+    held = {(node, p) for node, p in body["held"]}
     named = {i for cell in body["cells"] for i in cell} | set(body["surface"]) | {node for node, _ in held}
     demand(all(type(i) is int and 0 <= i < len(points) for i in named), "node numbers")
-    turned = {i: axes for i, axes in zip(body["surface"], tangents_and_normals(body), strict=True) if axes != upright}
-    demand(not any(node in turned for node, _ in held), "no support of a contact node with its own normal")
-    rows = Rows()
-    for cell in body["cells"]:
-        (x0, y0), (x1, y1), (x2, y2) = (points[i] for i in cell)
-        twice = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
-        demand(twice > 0, f"cell {cell} anticlockwise, of positive area")
-        slopes = zip(cell, [(y1 - y2, x2 - x1), (y2 - y0, x0 - x2), (y0 - y1, x1 - x0)], strict=True)
-        basis = [(i, p, g, u) for i, g in slopes for p, u in enumerate(turned.get(i, upright)) if (i, p) not in held]
-        for i, p, g, u in basis:  # the displacement u at a node has the gradient u g' over twice the area
-            row = rows.setdefault((i, p), {})
-            for j, q, h, w in basis:
-                shear = dot(g, w) * dot(h, u) + dot(g, h) * dot(u, w)
-                value = lame_lambda * dot(g, u) * dot(h, w) + lame_mu * shear
-                row[j, q] = row.get((j, q), 0) + value / (2 * twice)
-    demand_disjoint([[points[i] for i in cell] for cell in body["cells"]])
+    axes = dict(zip(body["surface"], zip(*tangents_and_normals(body), strict=True), strict=True))
+    turned = any(axes.get(node, ALONG_AXES) != ALONG_AXES for node, _ in held)
+    demand(not turned, "no support of a contact node with its own normal")
+    rows, triangles = Rows(), [[points[i] for i in cell] for cell in body["cells"]]
+    for cell, (a, b, c) in zip(body["cells"], triangles, strict=True):
+        area, strains = twice_area(a, b, c) / 2, {}
+        demand(area > 0, f"cell {cell} anticlockwise, of positive area")
+        for i, (x0, y0), (x1, y1) in zip(cell, (b, c, a), (c, a, b), strict=True):
+            gx, gy = (y0 - y1) / (2 * area), (x1 - x0) / (2 * area)  # the gradient of the function that is 1 at node i
+            for p, (ux, uy) in enumerate(axes.get(i, ALONG_AXES)):
+                strains[i, p] = ux * gx, uy * gy, ux * gy + uy * gx
+        free = [(unknown, strain) for unknown, strain in strains.items() if unknown not in held]
+        for (one, (xx, yy, xy)), (other, (vv, ww, vw)) in product(free, repeat=2):
+            density = lame_lambda * (xx + yy) * (vv + ww) + lame_mu * (2 * xx * vv + 2 * yy * ww + xy * vw)
+            rows.setdefault(one, {}).setdefault(other, fmpq(0))
+            rows[one][other] += area * density
+    demand_disjoint(triangles)
     return rows, sorted(rows, key=lambda unknown: (points[unknown[0]], unknown))
 
 
 def demand_disjoint(triangles: list[Any]) -> None:
     """Demand that no two triangles overlap: of two that do not, one has a side with the other one beyond it."""
-    turn = lambda a, b, c: (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
-    beyond = lambda one, other: any(all(turn(one[i - 1], one[i], at) <= 0 for at in other) for i in range(3))
-    boxes = ([(min(x), max(x)) for x in zip(*triangle, strict=True)] for triangle in triangles)
+    boxes = ([(min(values), max(values)) for values in zip(*triangle, strict=True)] for triangle in triangles)
     near: list[Any] = []  # those before, from left to right, that reach as far as the next one begins
     for ((left, right), (low, high)), triangle in sorted(zip(boxes, triangles, strict=True)):
         near = [other for other in near if other[0] > left]
@@ -142,11 +135,20 @@ def demand_disjoint(triangles: list[Any]) -> None:
         near.append((right, low, high, triangle))
 
 
-def tangents_and_normals(body: Json) -> list[Any]:
-    """Tangent and normal of each contact node; along x and y where the body lists none."""
+def beyond(triangle: list[Vector], other: list[Vector]) -> bool:
+    """True if a side of a triangle has the other one beyond it."""
+    return any(all(twice_area(triangle[i - 1], triangle[i], at) <= 0 for at in other) for i in range(3))
+
+
+def twice_area(a: Vector, b: Vector, c: Vector) -> Any:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+
+
+def tangents_and_normals(body: Json) -> tuple[list[Vector], list[Vector]]:
+    """Tangents and normals at the contact nodes; along x and y where the body lists none."""
     normals = [(rational(x), rational(y)) for x, y in body.get("normals") or [["0", "1"]] * len(body["surface"])]
-    demand(len(normals) == len(body["surface"]) and all(dot(n, n) == 1 for n in normals), "normals of length 1")
-    return [((y, -x), (x, y)) for x, y in normals]
+    demand(len(normals) == len(body["surface"]) and all(x * x + y * y == 1 for x, y in normals), "normals of length 1")
+    return [(y, -x) for x, y in normals], [*normals]
 
 
 def neumann_and_contact(discrete: Json) -> list[Json]:
@@ -171,10 +173,10 @@ def contact_positions(discrete: Json) -> tuple[list[arb], list[arb]]:
         lengths = (((a - x) ** 2 + (b - y) ** 2).sqrt() for (a, b), (x, y) in pairwise(nodes))
         both.append(([x for x, _ in nodes], [*accumulate(lengths, initial=arb(0))]))
     for other, own in zip(*both, strict=True):
-        widths = [b - a for a, b in pairwise([own[0], *own, own[-1]])]
-        halves = [(a + b) / 2 for a, b in pairwise(widths)]
-        fits = len(halves) == len(weights) and all(width > 0 for width in widths[1:-1])
-        if fits and all(close(w, h, h) for w, h in zip(weights, halves, strict=True)):
+        ends = [own[0], *own, own[-1]]
+        halves = [(after - before) / 2 for before, after in zip(ends, ends[2:], strict=False)]
+        increase = len(own) == len(weights) and all(a < b for a, b in pairwise(own))
+        if increase and all(map(close, weights, halves, halves)):
             return own, (other if discrete["transfer"] else own)
     raise Refused("needed the trapezoid weights of the contact nodes")
 
@@ -182,19 +184,20 @@ def contact_positions(discrete: Json) -> tuple[list[arb], list[arb]]:
 def kernel_is_hat(discrete: Json, radius: Json) -> bool:
     """True if the kernel is the hat of a radius, ``max(0, 1 - |x - y|/r)/r``."""
     r, (own, other) = arb(rational(radius)), contact_positions(discrete)
-    hat = [[arb(0).max(1 - abs(x - y) / r) / r for y in other] for x in own]
-    listed = rational_matrix(discrete["kernel"], len(own), len(other)).tolist()
-    return all(close(a, b, 1 / r) for rows in zip(listed, hat, strict=True) for a, b in zip(*rows, strict=True))
+    listed = rational_matrix(discrete["kernel"], len(own), len(other)).entries()
+    hat = [arb(0).max(1 - abs(x - y) / r) / r for x in own for y in other]
+    return all(close(one, value, 1 / r) for one, value in zip(listed, hat, strict=True))
 
 
 class TwoSteps(NamedTuple):
-    """Differences of two steps, as linear forms in (d, c): ``p`` and ``v`` by component, tangential ones first."""
+    """Differences of two steps, as linear forms in (d, c): a row for each component, tangential ones first."""
 
     S_n: arb_mat
-    moved: arb_mat  # P' p as a matrix that is applied to c
-    p: list[Form]
-    v: list[Form]
-    zeta: list[Form]
+    g: arb_mat  # of the forces
+    reaction: arb_mat  # P' p
+    p: list[Any]
+    v: list[Any]
+    zeta: list[Any]
     rubs: list[fmpq]  # w k
 
 
@@ -205,19 +208,20 @@ def two_steps(discrete: Json, k: fmpq, eliminated: Callable[..., arb_mat]) -> Tw
     ``v = -(P d + c)``, P being the transfer between both grids, and the friction bounds by at most ``w k |zeta|``,
     ``zeta = kernel g_N``.  Without friction ``p_T = 0``, and c has only normal components.
     """
-    neumann, contact = neumann_and_contact(discrete)
+    neumann, contact = bodies = neumann_and_contact(discrete)
     n, m = len(contact["surface"]), len(neumann["surface"])
     S_n, S_c = eliminated(neumann, both=True), eliminated(contact, both=k != 0)
-    P = rational_matrix(discrete["transfer"], n, m) if discrete["transfer"] else arb_mat(n, n, 1)
-    demand(P.ncols() == m, "a transfer between contact nodes that differ")
-    components = lambda body, which: [(j, axes[q]) for q in which for j, axes in enumerate(tangents_and_normals(body))]
-    of, onto = components(neumann, (0, 1)), components(contact, (0, 1) if k != 0 else (1,))
-    across = [[P[i, j] * dot(u, w) for j, w in of] for i, u in onto]
-    p = [[arb(0)] * len(of) + row for row in S_c.tolist()]
-    v = [[-x for x in row] + [-arb(i == j) for j in range(len(onto))] for i, row in enumerate(across)]
-    zeta = rational_matrix(discrete["kernel"], n, m) * arb_mat(S_n.tolist()[m:]) if k != 0 else arb_mat(0, 2 * m)
-    moved, padded = arb_mat(across).transpose() * S_c, [row + [arb(0)] * len(onto) for row in zeta.tolist()]
-    return TwoSteps(S_n, moved, p, v, padded, [k * rational(w) for w in discrete["weights"] if k != 0])
+    grids = rational_matrix(discrete["transfer"], n, m) if discrete["transfer"] else arb_mat(n, n, 1)
+    demand(grids.ncols() == m, "a transfer between contact nodes that differ")
+    of, onto = ([*enumerate(tangents), *enumerate(normals)] for tangents, normals in map(tangents_and_normals, bodies))
+    onto = onto if k != 0 else onto[n:]
+    P = arb_mat([[grids[i, j] * (ux * wx + uy * wy) for j, (wx, wy) in of] for i, (ux, uy) in onto])
+    unknowns = arb_mat(len(of) + len(onto), len(of) + len(onto), 1).tolist()
+    d, c = arb_mat(unknowns[: len(of)]), arb_mat(unknowns[len(of) :])
+    g, p, v = S_n * d, S_c * c, -(P * d + c)
+    zeta = rational_matrix(discrete["kernel"], n, m) * arb_mat(g.tolist()[m:]) if k != 0 else arb_mat(0, 0)
+    rubs = [k * rational(w) for w in discrete["weights"] if k != 0]
+    return TwoSteps(S_n, g, P.transpose() * p, p.tolist(), v.tolist(), zeta.tolist(), rubs)
 
 
 def norm(steps: TwoSteps, given: Json) -> arb_mat | None:
@@ -234,17 +238,13 @@ def norm(steps: TwoSteps, given: Json) -> arb_mat | None:
 
 
 def margin(steps: TwoSteps, theta: fmpq, factor: fmpq, Q: arb_mat | None) -> arb_mat:
-    """``factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2`` as a matrix in (d, c), with ``g = S_n d``."""
-    S, moved = steps.S_n, steps.moved
-    weigh: Callable[[arb_mat], arb_mat] = S.solve if Q is None else lambda forces: Q * forces
-    of_g, of_both = (S, moved) if Q is None else (S * weigh(S), S * weigh(moved))
-    corner, mixed = (factor**2 - (1 - theta) ** 2) * of_g, -theta * (1 - theta) * of_both
-    square = -(theta**2) * moved.transpose() * weigh(moved)
-    halves = ((corner, mixed), (mixed.transpose(), square))
-    return arb_mat([a + b for half in halves for a, b in zip(*(part.tolist() for part in half), strict=True)])
+    """``factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2`` as a matrix in (d, c)."""
+    g, after = steps.g, theta * steps.reaction + (1 - theta) * steps.g
+    weighed = [steps.S_n.solve(force) if Q is None else Q * force for force in (g, after)]
+    return factor**2 * g.transpose() * weighed[0] - after.transpose() * weighed[1]
 
 
-def inequalities(steps: TwoSteps, leaf: Json) -> Iterator[tuple[fmpq, Form, Form]]:
+def inequalities(steps: TwoSteps, leaf: Json) -> Iterator[Product]:
     """Products whose sum is >= 0: ``lambda p_N v_N + tau p_T v_T + w k (a zeta^2 + b v_T^2)`` at each node.
 
     Pressure is a monotone function of the jump: ``p_N v_N >= 0``.  So is friction up to its bound: ``p_T v_T >= -w k
@@ -261,7 +261,7 @@ def inequalities(steps: TwoSteps, leaf: Json) -> Iterator[tuple[fmpq, Form, Form
     yield from ((w * x, slip, slip) for w, x, slip in zip(steps.rubs, b[:t], steps.v[:t], strict=True))
 
 
-def equations(steps: TwoSteps, leaf: Json, cases: Cases) -> Iterator[tuple[fmpq, Form, Form]]:
+def equations(steps: TwoSteps, leaf: Json, cases: Cases) -> Iterator[Product]:
     """Products that are 0 on the pieces of some cases, one for each, so that its multiplier may have any sign.
 
     A node touches, ``v_N = 0`` (normal, 1), or is open, ``p_N = 0`` (-1).  For one e, 1 or -1 (signs), ``(p_T - e w k
@@ -281,17 +281,17 @@ def equations(steps: TwoSteps, leaf: Json, cases: Cases) -> Iterator[tuple[fmpq,
         yield value, left, right
 
 
-def leaves(tree: Json, cases: Cases = (), signs: Iterable[Any] = ()) -> Iterator[tuple[Json, Cases]]:
+def leaves(tree: Json, cases: Cases = ()) -> Iterator[tuple[Json, Cases]]:
     """The leaves of a tree, each with its cases.  A division has both cases of a node, so that no piece is left out."""
     if "cases" not in tree:
         yield tree, cases
         return
-    kind, j, branches, known = tree["divided"], tree["node"], tree["cases"], dict(signs)
+    kind, j, branches = tree["divided"], tree["node"], tree["cases"]
+    signs = {node: case for divided, node, case, _ in cases if divided == "signs"}
     demand(len(branches) == 2, "both cases of each division")
-    demand(kind in ("normal", "signs") or (kind == "slip" and j in known), "normal, signs, or then slip")
+    demand(kind in ("normal", "signs") or (kind == "slip" and j in signs), "normal, signs, or then slip")
     for branch, case in zip(branches, (1, -1), strict=True):
-        known = {**known, j: case} if kind == "signs" else known
-        yield from leaves(branch, (*cases, (kind, j, case, known.get(j))), known.items())
+        yield from leaves(branch, (*cases, (kind, j, case, case if kind == "signs" else signs.get(j))))
 
 
 def positive_definite(form: arb_mat) -> bool:
@@ -302,6 +302,10 @@ def positive_definite(form: arb_mat) -> bool:
     A, B = (arb_mat([row[part] for row in rows[:half]]) for part in (slice(half), slice(half, None)))
     C = arb_mat([row[half:] for row in rows[half:]])
     return positive_definite(A) and positive_definite(C - B.transpose() * A.solve(B))
+
+
+def close(one: Any, other: Any, size: Any) -> bool:
+    return bool(abs(one - other) < size / 10**6)
 
 
 def demand(holds: bool, needed: str) -> None:
@@ -317,17 +321,11 @@ def rational(text: Json) -> fmpq:
 
 def rational_matrix(rows: Json, n: int, m: int) -> arb_mat:
     demand(len(rows) == n and all(len(row) == m for row in rows), f"a matrix of {n} x {m}")
-    return arb_mat([[arb(rational(x)) for x in row] for row in rows])
+    return arb_mat([[rational(x) for x in row] for row in rows])
 
 
-def gathered(rows: Rows, wanted: Iterable[Any], columns: list[Any]) -> arb_mat:
-    entries = [[rows[i].get(j, 0) for j in columns] for i in wanted]
-    return arb_mat(len(entries), len(columns), [x for row in entries for x in row])
-
-
-def subtract(rows: Rows, wanted: list[Any], columns: list[Any], less: arb_mat) -> None:
-    for i, line in zip(wanted, (gathered(rows, wanted, columns) - less).tolist(), strict=True):
-        rows[i].update(zip(columns, line, strict=True))
+def entries(rows: Rows, wanted: list[Unknown], columns: list[Unknown]) -> arb_mat:
+    return arb_mat(len(wanted), len(columns), [rows[i].get(j, 0) for i in wanted for j in columns])
 
 
 def digest(data: Json) -> str:
@@ -338,19 +336,20 @@ def digest(data: Json) -> str:
 def words(document: Json) -> str:
     """The claim and its bodies, for a reader."""
     discrete, claim = document["discrete"], document["claim"]
-    bodies = [
-        f"{name}: {len(body['points'])} nodes, {len(body['cells'])} triangles, E {body['young']}, nu {body['poisson']}"
-        for name, body in ((name, discrete[name]) for name in ("body1", "body2"))
-    ]
-    kernel = f"hat kernel of radius {claim['radius']}" if "radius" in claim else "kernel that it lists"
-    friction = f"k {discrete['friction']} with the {kernel}" if rational(discrete["friction"]) != 0 else "no friction"
-    at = f"Neumann problem: body {discrete['neumann_body']}, {friction}, theta {claim['theta']}"
-    spare = float(arb(1 - rational(claim["factor"])).mid())
-    claimed = f"Lipschitz constant at most 1 - {spare:.10g} in the norm (5.21)"
+    friction, name = "no friction", "(5.21)"
+    if rational(discrete["friction"]) != 0:
+        kernel = f"hat kernel of radius {claim['radius']}" if "radius" in claim else "kernel that it lists"
+        friction = f"k {discrete['friction']} with the {kernel}"
     if "norm" in claim:
         condition = float(arb(rational(claim["norm"]["condition"])).mid())
-        claimed = f"{claimed.removesuffix('(5.21)')}Q of the certificate, of condition {condition:.6g} in (5.21)"
-    return "; ".join([*bodies, at, claimed])
+        name = f"Q of the certificate, of condition {condition:.6g} in (5.21)"
+    said = [
+        f"{name}: {len(body['points'])} nodes, {len(body['cells'])} triangles, E {body['young']}, nu {body['poisson']}"
+        for name, body in (("body1", discrete["body1"]), ("body2", discrete["body2"]))
+    ]
+    said.append(f"Neumann problem: body {discrete['neumann_body']}, {friction}, theta {claim['theta']}")
+    spare = float(arb(1 - rational(claim["factor"])).mid())
+    return "; ".join([*said, f"Lipschitz constant at most 1 - {spare:.10g} in the norm {name}"])
 
 
 def examine(document: Json) -> None:
@@ -360,7 +359,6 @@ def examine(document: Json) -> None:
 
 
 def main(path: str) -> int:
-    show = lambda text: print(repr(text)[1:-1])  # it may come from the certificate: nothing in it steers a terminal
     try:
         with open(path, encoding="utf-8") as file:
             document = json.load(file)
@@ -372,6 +370,10 @@ def main(path: str) -> int:
         return 1
     print("ACCEPTED:", "T_theta contracts" if rational(document["claim"]["factor"]) < 1 else "no contraction claimed")
     return 0
+
+
+def show(text: str) -> None:
+    print(repr(text)[1:-1])  # it may come from the certificate: nothing in it steers a terminal
 
 
 if __name__ == "__main__":

@@ -207,21 +207,21 @@ def test_no_tampered_tree_that_is_accepted_is_false(divided, truth):
     assert counts["refused", False] > count / 3
 
 
-def one_case_suffices(tree, cases=(), signs=()):
+def one_case_suffices(tree, cases=()):
     """Only the first case of each division is looked at."""
-    for leaf, path in LEAVES(tree, cases, signs):
+    for leaf, path in LEAVES(tree, cases):
         if all(case == 1 for _, _, case, _ in path):
             yield leaf, path
 
 
-def any_sign(tree, cases=(), signs=()):
+def any_sign(tree, cases=()):
     """No sign is asked for where a node slides."""
     if "cases" not in tree:
         yield tree, cases
         return
     kind, j = tree["divided"], tree["node"]
     for branch, case in zip(tree["cases"], (1, -1), strict=True):
-        yield from any_sign(branch, (*cases, (kind, j, case, 1)), signs)
+        yield from any_sign(branch, (*cases, (kind, j, case, 1)))
 
 
 LEAVES = check.leaves
