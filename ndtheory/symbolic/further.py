@@ -41,34 +41,7 @@ from ndtheory.symbolic.section5 import (
     s,
     with_theta,
 )
-from ndtheory.symbolic.symbols import (
-    C_R,
-    CONSTANTS,
-    L1,
-    L2,
-    A,
-    C_s,
-    M,
-    a1,
-    a2,
-    b,
-    c,
-    d1,
-    d2,
-    e,
-    k,
-    m,
-    mu,
-    o,
-    p,
-    psi,
-    q,
-    r,
-    theta,
-    x,
-    xi,
-    y,
-)
+from ndtheory.symbolic.symbols import *
 
 CHECKS = CheckList()
 check = CHECKS.add

@@ -29,36 +29,7 @@ from ndtheory.symbolic.engine import (
     nonnegative,
     positive,
 )
-from ndtheory.symbolic.symbols import (
-    C_R,
-    CONSTANTS,
-    L1,
-    L2,
-    A,
-    C,
-    C_s,
-    M,
-    a1,
-    a2,
-    b,
-    c,
-    d1,
-    d2,
-    e,
-    k,
-    m,
-    mu,
-    o,
-    p,
-    psi,
-    q,
-    r,
-    test,
-    theta,
-    x,
-    xi,
-    y,
-)
+from ndtheory.symbolic.symbols import *
 
 CHECKS = CheckList()
 check = CHECKS.add
