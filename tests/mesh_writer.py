@@ -32,6 +32,11 @@ def write_gmsh22(
     )
 
 
+def rotation(angle: float) -> np.ndarray:
+    """The matrix by which rows of points are multiplied to be rotated about the origin."""
+    return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+
 def write_curved(
     path: Path, x: Sequence[float], low: Callable[[np.ndarray], np.ndarray], high: Callable[[np.ndarray], np.ndarray]
 ) -> str:

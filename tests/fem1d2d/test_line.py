@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mesh_writer import rotation
 
 from fem1d2d import Line, Mesh, MeshError, mortar, rectangle, trapezoid
 
@@ -113,7 +114,7 @@ def test_a_constant_pressure_passes_from_line_to_line_and_positions_are_exact_on
     rng = np.random.default_rng(0)
     for _ in range(20):
         angle, gap = rng.uniform(0, 2 * np.pi), rng.uniform(-0.01, 0.1)
-        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        turn = rotation(angle)
         lower = rectangle((0.0, 1.0), (-0.5, 0.0), (int(rng.integers(1, 9)), 1))
         upper = rectangle((-0.3, 1.4), (gap, gap + 0.5), (int(rng.integers(1, 9)), 1))
         lower, upper = (Mesh(points=m.points @ turn, cells=m.cells, sides=m.sides) for m in (lower, upper))

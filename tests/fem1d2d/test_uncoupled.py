@@ -3,17 +3,12 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from condensed_cases import EPS, norm
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import fewer, held_bodies
 
 from fem1d2d import Condensation, Uncoupled, gram, plane_strain, rectangle, stiffness
-
-EPS = np.finfo(float).eps
-
-
-def norm(A):
-    return float(np.linalg.norm(np.asarray(A, dtype=float), 2)) if A.size else 0.0
 
 
 @pytest.fixture

@@ -130,6 +130,13 @@ class DenseBody:
         return self.R.T @ self.load
 
 
+def trace(body: DenseBody) -> np.ndarray:
+    """The matrix from a displacement of the unknowns to its trace along the normal of the contact body."""
+    result = np.zeros((len(body.trace), len(body.A)))
+    result[np.arange(len(body.trace)), body.trace] = body.signs
+    return result
+
+
 def symmetric(matrix: np.ndarray) -> np.ndarray:
     return (matrix + matrix.T) / 2
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import strategies
-from dense_oracle import DenseBody, DensePair, close, stretched, symmetric, top, with_moduli
+from dense_oracle import DenseBody, DensePair, close, stretched, symmetric, top, trace, with_moduli
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.linalg import eigh
@@ -32,13 +32,6 @@ def measured_of(data: Mapping[str, Any]) -> Measured:
 
 
 # --- pencils of whole bodies ------------------------------------------------------------------------------------------
-
-
-def trace(body: DenseBody) -> np.ndarray:
-    """Interface values of a displacement of the unknowns, along the normal of the contact body."""
-    T = np.zeros((len(body.trace), len(body.A)))
-    T[np.arange(len(body.trace)), body.trace] = body.signs
-    return T
 
 
 def flexibility(body: DenseBody) -> np.ndarray:

@@ -2,15 +2,11 @@
 
 import numpy as np
 import pytest
-from stacks import plate, stack, touch
+from stacks import close, plate, stack, touch
 
 import verification as vf
 
 read = vf.Problem.from_dict
-
-
-def close(one, other, within=1e-8):
-    return np.abs(np.subtract(one, other)).max() < within * np.abs(other).max()
 
 
 def test_two_contacts_of_one_body_have_no_common_node():

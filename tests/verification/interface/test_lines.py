@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.quiver import Quiver
-from mesh_writer import write_gmsh22
+from mesh_writer import rotation, write_gmsh22
 from two_methods import assert_same
 
 import verification as vf
@@ -36,17 +36,12 @@ PIN = Path(__file__).parents[3] / "docs" / "meshes" / "pin.toml"
 MOVED = 0.01
 
 
-def turned(points, angle):
-    """Points rotated about the origin."""
-    return points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-
-
 def write(path, x, cells, low, high, *, angle=0.0):
     """A body between the curves y = low(x) and y = high(x), rotated; sides bottom, top, left, right."""
     flat = rectangle((0.0, 1.0), (0.0, 1.0), cells)
     across = x[0] + (x[1] - x[0]) * flat.points[:, 0]
     y = (1 - flat.points[:, 1]) * low(across) + flat.points[:, 1] * high(across)
-    write_gmsh22(path, turned(np.column_stack([across, y]), angle), flat.cells, flat.sides)
+    write_gmsh22(path, np.column_stack([across, y]) @ rotation(angle), flat.cells, flat.sides)
     return {"mesh": str(path)}
 
 
@@ -54,12 +49,12 @@ def sector(path, radii, ends, cells, *, angle=0.0):
     """A sector of a ring; sides bottom and top at its ends, left inside and right outside."""
     flat = rectangle(radii, ends, cells)
     r, a = flat.points.T
-    write_gmsh22(path, turned(np.column_stack([r * np.cos(a), r * np.sin(a)]), angle), flat.cells, flat.sides)
+    write_gmsh22(path, np.column_stack([r * np.cos(a), r * np.sin(a)]) @ rotation(angle), flat.cells, flat.sides)
     return {"mesh": str(path)}
 
 
 def vector(x, y, angle):
-    return turned(np.array([[x, y]]), angle)[0].tolist()
+    return (np.array([x, y]) @ rotation(angle)).tolist()
 
 
 def ramp(folder, h=0.2, upper=0.2, angle=0.0, friction=0, **contact):

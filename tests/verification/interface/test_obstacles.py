@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mesh_writer import write_curved, write_gmsh22
+from mesh_writer import rotation, write_curved, write_gmsh22
 
 import verification as vf
 from fem1d2d import rectangle
@@ -57,7 +57,7 @@ def test_a_level_line_is_the_obstacle_with_an_interval():
 
 @pytest.mark.parametrize("angle", [0.7, np.pi])
 def test_an_obstacle_that_is_turned_with_the_body_has_the_same_pressure(angle, tmp_path):
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    turn = rotation(angle)
     flat = rectangle((-2.0, 2.0), (-2.0, 0.0), (16, 8))
     faces, found = [[a, a * a / 8] for a in np.linspace(-1, 1, 17)], []
     for i, by in enumerate((np.eye(2), turn)):

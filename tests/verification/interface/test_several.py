@@ -6,8 +6,8 @@ import pickle
 import jsonschema
 import numpy as np
 import pytest
-from mesh_writer import write_gmsh22
-from stacks import plate, stack, touch
+from mesh_writer import rotation, write_gmsh22
+from stacks import close, plate, stack, touch
 
 import verification as vf
 from fem1d2d import rectangle
@@ -39,10 +39,6 @@ def held(**more):
 
 
 read = vf.Problem.from_dict
-
-
-def close(one, other, within=1e-8):
-    return np.abs(np.subtract(one, other)).max() < within * np.abs(other).max()
 
 
 @pytest.mark.parametrize("data", [stack(), stack((8, 10, 7)), held()], ids=["stack", "grids differ", "held"])
@@ -372,7 +368,7 @@ def test_three_springs_in_a_ring_never_converge_undamped():
 def test_a_problem_turned_by_an_angle_has_the_same_results(tmp_path):
     found = []
     for angle in (0.0, 0.7):
-        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        turn = rotation(angle)
         data = stack(cells=(8, 10, 7))
         for i in (1, 2, 3):
             body = data[f"body{i}"]

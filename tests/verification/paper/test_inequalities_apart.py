@@ -11,7 +11,7 @@ from itertools import islice
 import numpy as np
 import pytest
 import section_5
-from dense_oracle import DenseBody, DensePair, symmetric, top
+from dense_oracle import DensePair, symmetric, top, trace
 from section_5 import PAIRS, assert_all_hold, draw_pair, ratios, thetas_for
 from strategies import AT_NIGHT
 
@@ -58,13 +58,6 @@ def pool() -> Pool:
 
 
 # --- the constants, over all displacements of the bodies --------------------------------------------------------------
-
-
-def trace(body: DenseBody) -> np.ndarray:
-    """gamma, tangential components first."""
-    result = np.zeros((len(body.trace), len(body.A)))
-    result[np.arange(len(body.trace)), body.trace] = body.signs
-    return result
 
 
 def by_definition(dense: DensePair) -> dict[str, float]:

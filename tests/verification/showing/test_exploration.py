@@ -46,9 +46,13 @@ def found(few):
     return vf.explore(plates(10))
 
 
+def data_of(found):
+    return json.loads(re.search(r"explore: (\{.*\}) \};</script>", found.page())[1])
+
+
 @pytest.fixture(scope="module")
 def data(found):
-    return json.loads(re.search(r"explore: (\{.*\}) \};</script>", found.page())[1])
+    return data_of(found)
 
 
 def places(found, count):
@@ -286,10 +290,6 @@ def with_history(**tables):
 @pytest.fixture(scope="module")
 def followed(few):
     return vf.explore(with_history(**VARIANTS["grids that differ"]))
-
-
-def data_of(found):
-    return json.loads(re.search(r"explore: (\{.*\}) \};</script>", found.page())[1])
 
 
 def moved(body, row, length, time):
