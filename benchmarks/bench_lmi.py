@@ -15,8 +15,8 @@ from timing import in_turn, timed
 
 import verification as vf
 from verification.ledger.cases import problem as random_problem
-from verification.semidefinite import interior_point, model
-from verification.semidefinite.interior_point import LMIError, Optimum, Program
+from verification.semidefinite import LMIError, interior_point, model
+from verification.semidefinite.interior_point import Optimum, Program
 from verification.semidefinite.lipschitz import GAP, budget, enclose
 from verification.semidefinite.losses import locate
 from verification.semidefinite.multipliers import QuadraticForms, friction_threshold

@@ -28,7 +28,7 @@ import verification as vf
 from verification.certificate import check
 from verification.certificate.claims import NoCertificate
 from verification.machine.threads import one_thread
-from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite import LMIError
 from verification.semidefinite.multipliers import QuadraticForms
 
 # --- what is put forward ----------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats, Ints, Mesh, MeshError
+from fem1d2d.mesh import Bools, Floats, Ints, Mesh, MeshError
 from fem1d2d.trace import SAME
 
 #: Pairs of an edge and a node that are computed together: arrays of some 10 MB.
@@ -48,7 +48,7 @@ class Line:
     images: tuple[Floats | None, Floats | None] = (None, None)
 
     @classmethod
-    def along(cls, mesh: Mesh, side: str, *, left: bool, mirrored: NDArray[np.bool_] | None = None) -> Line:
+    def along(cls, mesh: Mesh, side: str, *, left: bool, mirrored: Bools | None = None) -> Line:
         """Order the nodes of a named side, which is one line with two ends and without a sharp corner.
 
         Parameters as of :meth:`parts`.
@@ -70,7 +70,7 @@ class Line:
 
     @classmethod
     def parts(
-        cls, mesh: Mesh, side: str, *, left: bool, mirrored: NDArray[np.bool_] | None = None, away: Floats | None = None
+        cls, mesh: Mesh, side: str, *, left: bool, mirrored: Bools | None = None, away: Floats | None = None
     ) -> list[Line]:
         """Order the nodes of a named side, which is cut at corners of more than SHARPEST degrees.
 
@@ -96,19 +96,20 @@ class Line:
         return cls._cut(nodes, points, None, away)
 
     @classmethod
-    def _cut(cls, nodes: Ints, points: Floats, mirrored: NDArray[np.bool_] | None, away: Floats | None) -> list[Line]:
+    def _cut(cls, nodes: Ints, points: Floats, mirrored: Bools | None, away: Floats | None) -> list[Line]:
         turns = _turns(points[nodes])
         if nodes[0] == nodes[-1]:
             first = int(np.argmax(turns[:-1]))
             if turns[first] <= SHARPEST and away is not None:
-                first = _farthest(points[nodes[:-1]], away)
+                distances = np.linalg.norm(points[nodes[:-1], None] - away, axis=2)
+                first = int(np.argmax(distances.min(axis=1)))  # the node farthest from all of these
             nodes, turns = (np.append(np.roll(values[:-1], -first), values[first]) for values in (nodes, turns))
         cuts = np.flatnonzero(turns[1:-1] > SHARPEST) + 1
         ends = pairwise([0, *cuts.tolist(), len(nodes) - 1])
         return [cls._smooth(nodes[begin : end + 1], points, mirrored) for begin, end in ends]
 
     @classmethod
-    def _smooth(cls, nodes: Ints, every: Floats, mirrored: NDArray[np.bool_] | None) -> Line:
+    def _smooth(cls, nodes: Ints, every: Floats, mirrored: Bools | None) -> Line:
         """The line through nodes that follow each other."""
         points = every[nodes]
         steps = np.diff(points, axis=0)
@@ -218,14 +219,14 @@ class Line:
         reaches = np.append(s[1:] > self.slack, True) & np.insert(s[:-1] < self.s[-1] - self.slack, 0, True)
         return Seen(gap=gap, s=s, reaches=reaches)
 
-    def _meetings(self, other: Line) -> tuple[Floats, NDArray[np.bool_]]:
+    def _meetings(self, other: Line) -> tuple[Floats, Bools]:
         """The positions on another line that normals meet first, and where they do; elsewhere its nearer end."""
         n, step = len(self.points), max(1, TOGETHER // len(other.points))
         parts = [self._meets(other, np.arange(i, min(i + step, n))) for i in range(0, n, step)]
         met, faces = (np.concatenate(found) for found in zip(*parts, strict=True))
         return met, faces
 
-    def _meets(self, other: Line, nodes: Ints) -> tuple[Floats, NDArray[np.bool_]]:
+    def _meets(self, other: Line, nodes: Ints) -> tuple[Floats, Bools]:
         points, normals = self.points[nodes], self.normals[nodes]
         start, along = other.points[:-1, None], np.diff(other.points, axis=0)[:, None]  # (edges, 1, 2)
         tangents = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
@@ -259,7 +260,7 @@ class Seen:
 
     gap: Floats
     s: Floats
-    reaches: NDArray[np.bool_]
+    reaches: Bools
 
 
 def smooth(known: Floats, values: Floats, x: Floats) -> Floats:
@@ -299,13 +300,8 @@ def _turns(points: Floats) -> Floats:
     steps = np.diff(points, axis=0)
     closed = bool((points[0] == points[-1]).all())
     before, after = np.vstack([steps[[-1 if closed else 0]], steps]), np.vstack([steps, steps[[0 if closed else -1]]])
-    return np.asarray(np.abs(np.degrees(np.arctan2(_cross(before, after), (before * after).sum(axis=1)))))
-
-
-def _farthest(points: Floats, others: Floats) -> int:
-    """The point of a line that lies farthest from any of some others."""
-    nearest = [float(np.linalg.norm(others - point, axis=1).min()) for point in points]
-    return int(np.argmax(nearest))
+    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.asarray(np.abs(np.degrees(np.arctan2(turn, (before * after).sum(axis=1)))))
 
 
 def chains(edges: Ints) -> list[Ints]:
@@ -334,10 +330,6 @@ def _directions(vectors: Floats) -> Floats:
     along = np.abs(found) > 1 - SAME**2 / 2
     found[along] = np.rint(found[along])
     return np.asarray(found)
-
-
-def _cross(u: Floats, v: Floats) -> Floats:
-    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
 def _at(point: NDArray[Any]) -> str:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d import outline
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from fem1d2d.outline import Bools as Bools
+from fem1d2d.outline import Floats as Floats
+from fem1d2d.outline import Ints as Ints
 
 
 class MeshError(ValueError):

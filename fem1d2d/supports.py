@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from fem1d2d.mesh import Cells, Floats, Mesh, MeshError, edges, undirected
+from fem1d2d.mesh import Bools, Cells, Floats, Mesh, MeshError, edges, undirected
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +26,7 @@ class Supports:
         Displacement where held (unit of length), 0 elsewhere.
     """
 
-    held: NDArray[np.bool_]
+    held: Bools
     values: Floats
 
     def __post_init__(self) -> None:
@@ -68,7 +68,7 @@ def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Support
     return Supports(held=held, values=values)
 
 
-def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
+def rigid_motions(mesh: Mesh, known: Bools) -> Floats:
     """The rigid motions that supports leave: a basis of the kernel of the stiffness matrix of the free unknowns.
 
     Shape (n, d, k): k orthonormal motions, 0 where ``known``, of shape (n, d), holds; k = 3 for an unsupported plane

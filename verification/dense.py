@@ -23,6 +23,11 @@ def times(S: Floats, v: Floats) -> Floats:
     return product
 
 
+def symmetric(matrices: Floats) -> Floats:
+    """Return the symmetric part of a matrix, or of each of several, shape (.., n, n)."""
+    return np.asarray((matrices + np.swapaxes(matrices, -1, -2)) / 2)
+
+
 def vanishing(motions: Floats, rows: Ints) -> Floats:
     """Return combinations of orthonormal columns, shape (n, k), that vanish on some rows, orthonormal too."""
     k = motions.shape[1]

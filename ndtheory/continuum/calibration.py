@@ -77,7 +77,7 @@ class Calibration:
         columns = len(self.x) - 1
         if not len(self.tau) == len(self.beta) == columns or min(*self.tau, *self.beta) < 0:
             raise HypothesisError("calibration", "its weights", f"numbers >= 0 for {columns} columns of cells")
-        if not all(_nonnegative(form) for form in self._forms()):
+        if not all(xx >= 0 and yy >= 0 and xx * yy >= xy * xy for xx, xy, yy in self._forms()):
             raise HypothesisError("calibration", "a field", "one that proves the inequality")
 
     def _forms(self) -> Iterator[Form]:
@@ -151,8 +151,3 @@ def loss(reach: Interval) -> Fraction:
     """
     grown = Interval(reach.lo, reach.lo).exp()
     return Fraction((4 / (grown - 1 / grown).square()).hi)
-
-
-def _nonnegative(form: Form) -> bool:
-    xx, xy, yy = form
-    return xx >= 0 and yy >= 0 and xx * yy >= xy * xy

@@ -125,7 +125,8 @@ def _in_chart(goal: Goal, chart: Mapping[Any, Any]) -> Decision:
     inserted = lambda expression: rational(sp.sympify(expression).xreplace(values))
     difference = inserted(relation.right) - inserted(relation.left)
     if relation.sign == "=":
-        if _vanishes(difference):
+        quotient = _quotient(difference)
+        if quotient is not None and not quotient.polynomial:  # the numerator expands to 0
             return Decision(holds=True)
     else:
         squares = [inserted(square) for square in goal.squares]
@@ -166,12 +167,6 @@ def _quotient(difference: Any) -> Quotient | None:
         with suppress(NotRational):
             return Quotient.of(read())
     return None
-
-
-def _vanishes(difference: Any) -> bool:
-    """True if the numerator expands to 0."""
-    quotient = _quotient(difference)
-    return quotient is not None and not quotient.polynomial
 
 
 def _certified(difference: Any, *, strict: bool) -> bool:

@@ -9,8 +9,7 @@ import pytest
 from problem_list import blocks, small
 
 import verification as vf
-from verification.semidefinite import interior_point
-from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite import LMIError, interior_point
 from verification.semidefinite.multipliers import NARROW, QuadraticForms, friction_threshold
 
 THETAS = np.linspace(0.1, 0.9, 9)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space, schur
 
-from fem1d2d.mesh import Floats, Ints
-from verification.contact.active_set import Pattern
+from fem1d2d.mesh import Bools, Floats, Ints
+from verification.contact.active_set import Pattern, Signs
 from verification.dense import STILL, Cholesky, vanishing
 from verification.interface.pair import ContactPair
 from verification.value import Value, freeze
@@ -49,8 +49,8 @@ class Piece(Value):
 
     pair: ContactPair
     pattern: Pattern
-    sign: NDArray[np.int8]
-    still: NDArray[np.bool_]
+    sign: Signs
+    still: Bools
 
     @property
     def summary(self) -> str:
@@ -75,8 +75,7 @@ class Piece(Value):
     def jump(self) -> Floats:
         """Derivative of v (slip and minus the gap) by g, shape (2 n, 2 n): 0 where a node sticks or touches."""
         contact, t, carried = self.pair.contact, self.pair.contact.grid.t, self._carried
-        moves = np.concatenate([self.pattern.sliding != 0, ~self.pattern.touching])
-        rows = np.flatnonzero(moves & contact.free)
+        rows = np.flatnonzero(self.pattern.moves & contact.free)
         result = np.zeros(carried.shape)
         if len(rows):
             load = -contact.schur @ carried
@@ -92,8 +91,7 @@ class Piece(Value):
 
         Otherwise T is not affine here: a change of the bound sets the contact body in motion, or stops it.
         """
-        moves = np.concatenate([self.pattern.sliding != 0, ~self.pattern.touching])
-        free = vanishing(self.pair.contact.motions, np.flatnonzero(~moves))
+        free = vanishing(self.pair.contact.motions, np.flatnonzero(~self.pattern.moves))
         work = free[: len(self.sign)].T @ (self.pattern.sliding[:, None] * self.bound) if free.size else free
         return float(np.abs(work).max(initial=0.0)) <= STILL * float(np.abs(self.bound).max(initial=0.0))
 
@@ -169,7 +167,7 @@ def piece_of(pair: ContactPair, g: Floats, pattern: Pattern) -> Piece:
     return Piece(pair=pair, pattern=pattern, sign=sign, still=still)
 
 
-def signs_of(pair: ContactPair, g: Floats, pattern: Pattern) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+def signs_of(pair: ContactPair, g: Floats, pattern: Pattern) -> tuple[Signs, Bools]:
     """Return ``sign`` and ``still`` of that piece."""
     neumann = pair.neumann.grid
     sign, still = np.zeros(pair.contact.grid.t, dtype=np.int8), np.zeros(neumann.n, dtype=bool)

@@ -36,8 +36,8 @@ from verification.interface.pair import UNITS, ContactPair, pair_from
 from verification.machine.progress import Progress, silent
 from verification.problem import Problem, ProblemError, load
 from verification.registry import BOUNDS
+from verification.semidefinite import LMIError
 from verification.semidefinite.conditions import Conditions
-from verification.semidefinite.interior_point import LMIError
 from verification.semidefinite.lipschitz import Division, Leaf
 from verification.semidefinite.multipliers import QuadraticForms
 

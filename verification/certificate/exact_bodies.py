@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from fem1d2d import interval, mortar, rectangle_points, trapezoid
 from fem1d2d.element import lacks
+from fem1d2d.mesh import Bools
 from fem1d2d.proofs import exact
 from fem1d2d.proofs.enclosed import UNIT, Enclosed, gamma, nearest
 from fem1d2d.proofs.exact import Shapes
@@ -220,7 +221,7 @@ class ExactInterface:
         rows, columns = P.middle.shape
         return P.block(np.arange(rows - self.grid.n, rows), np.arange(columns))
 
-    def tangential_mass(self, tangential: NDArray[np.bool_]) -> Enclosed:
+    def tangential_mass(self, tangential: Bools) -> Enclosed:
         """Return B_T on the free components of the contact grid."""
         free = self.pair.contact.free[self.pair.contact.grid.tangential]
         entries = np.zeros(len(tangential), dtype=object)

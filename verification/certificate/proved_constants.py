@@ -20,9 +20,8 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from fem1d2d.proofs.enclosed import UNIT, Enclosed, gamma, upwards
 from fem1d2d.proofs.loewner import Elimination, positive_definite
 from fem1d2d.proofs.proved import Ends, enclose_largest, inverse, root
@@ -155,7 +154,7 @@ class Proof:
         self.E = {name: self._schur(body, body.gram) for name, body in self.bodies.items()}
         free, grid = pair.contact.free, pair.contact.grid
         measured = self.measured
-        self.tangential: NDArray[np.bool_] = (np.arange(grid.size) < grid.t)[free]
+        self.tangential: Bools = (np.arange(grid.size) < grid.t)[free]
         self.progress("proving the constants along Gamma_c", None)
         self._of_rho()
         with self._or_why("C_R"):

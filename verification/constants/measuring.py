@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem1d2d import Eigenvalue, elimination_order, largest, largest_sparse, solver
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from ndtheory import Number
 from verification.constants.measured import (
     ALL_NAMES,
@@ -22,7 +21,7 @@ from verification.constants.measured import (
     Measured,
 )
 from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
-from verification.dense import Cholesky, pinned
+from verification.dense import Cholesky, pinned, symmetric
 from verification.interface.assembly import TwoBodies
 from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair
@@ -192,7 +191,7 @@ def _of(body: Body, smallest: Eigenvalue | None, biggest: Eigenvalue) -> BodyCon
     )
 
 
-def of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
+def of_section_5(pair: ContactPair, tangential: Bools) -> dict[str, float | None]:
     """C_R, C_tr and C_s of Section 5: matrices on the components that Gamma_u leaves free.
 
     Where the bodies have different traces P carries forms of the contact body to the Neumann grid.  Section 5 needs no
@@ -229,11 +228,11 @@ def of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, 
             force = force if body is neumann else interface.carry_back(force)
             z = kernel @ force[-pair.neumann.grid.n :]
             squares[body.name] = z.T @ (grid.weights[:, None] * z)
-        values["C_s"] = float(np.sqrt(max(largest((z + z.T) / 2, E[name]).value for name, z in squares.items())))
+        values["C_s"] = float(np.sqrt(max(largest(symmetric(z), E[name]).value for name, z in squares.items())))
     return values
 
 
-def of_energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
+def of_energy(pair: ContactPair, tangential: Bools) -> dict[str, float | None]:
     """rho and the constants of friction in energy norms, with P between the grids."""
     interface, grid, kernel = pair.interface, pair.contact.grid, pair.interface.kernel
     contact = _free(pair.contact)
@@ -251,7 +250,7 @@ def of_energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, flo
         normal = np.arange(pair.neumann.grid.size)[pair.neumann.free] >= pair.neumann.grid.t
         root = np.sqrt(grid.weights)[:, None] * kernel
         stress = root @ neumann[np.ix_(normal, normal)] @ root.T
-        values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
+        values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh(symmetric(stress))[-1]))
     if not pair.contact.slides:  # else it is infinite; motions that do not slide do not enter the maximum
         motions = _motions(pair.contact)
         definite = contact if motions is None else pinned(contact, np.arange(len(contact)), motions)
@@ -298,7 +297,7 @@ def _motions(side: Condensed) -> Floats | None:
     return side.motions[side.free] if side.loose else None
 
 
-def _tangential_mass(pair: ContactPair, tangential: NDArray[np.bool_]) -> Floats:
+def _tangential_mass(pair: ContactPair, tangential: Bools) -> Floats:
     """B_T: the quadrature of ``|v_T|^2`` on the free components of the contact grid."""
     grid = pair.contact.grid
     weights = np.zeros(len(tangential))
@@ -314,4 +313,4 @@ def _condense_tangential(S: Floats, normal: Any, motions: Floats | None = None) 
     cross = S[np.ix_(slide, normal)]
     inner = Cholesky(S, np.flatnonzero(slide), motions).solve(S[:, normal])[slide]
     result = S[np.ix_(normal, normal)] - cross.T @ inner
-    return np.asarray((result + result.T) / 2)
+    return symmetric(result)

@@ -10,9 +10,12 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from verification.dense import STILL, Cholesky, vanishing, worst
 from verification.value import Value
+
+#: 0 or a sign at each node, as of its slip.
+Signs = NDArray[np.int8]
 
 #: Signs are read with this slack relative to the largest force, so that rounding does not flip a node for ever.
 SLACK = 1e-14
@@ -32,8 +35,8 @@ class Pattern(Value):
     of its friction force.
     """
 
-    touching: NDArray[np.bool_]
-    sliding: NDArray[np.int8]
+    touching: Bools
+    sliding: Signs
 
     @property
     def summary(self) -> str:
@@ -43,6 +46,11 @@ class Pattern(Value):
     def key(self) -> bytes:
         """Bytes that are equal for equal patterns."""
         return self.touching.tobytes() + self.sliding.tobytes()
+
+    @cached_property
+    def moves(self) -> Bools:
+        """True where a component moves: where a node slides, and where it is open, shape (t + n,)."""
+        return np.concatenate([self.sliding != 0, ~self.touching])
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Pattern) and self.key == other.key
@@ -73,13 +81,12 @@ class System:
     one the equilibrium fails.
     """
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_], pattern: Pattern, motions: Floats | None = None) -> None:
+    def __init__(self, S: Floats, free: Bools, pattern: Pattern, motions: Floats | None = None) -> None:
         self.pattern = pattern
         self._slides, self._open = pattern.sliding != 0, ~pattern.touching
         self.sign = pattern.sliding.astype(float)
-        moves = np.concatenate([self._slides, self._open])
-        self.loose = None if motions is None else vanishing(motions, np.flatnonzero(~moves))
-        self._rows = np.flatnonzero(moves & free)
+        self.loose = None if motions is None else vanishing(motions, np.flatnonzero(~pattern.moves))
+        self._rows = np.flatnonzero(pattern.moves & free)
         self._columns, self._factor = S[self._rows], Cholesky(S, self._rows, motions)
 
     def solve(self, q: Floats, bound: Floats) -> tuple[Floats, Floats]:
@@ -98,7 +105,7 @@ class System:
 class Systems:
     """The linear systems of the patterns of one stiffness matrix (see :class:`System`), each made once while in use."""
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_], motions: Floats | None = None) -> None:
+    def __init__(self, S: Floats, free: Bools, motions: Floats | None = None) -> None:
         made = lru_cache(maxsize=1 + KEPT // (2 * S.size + 1))
         self.of: Callable[[Pattern], System] = made(lambda pattern: System(S, free, pattern, motions))
 
@@ -112,18 +119,13 @@ class ActiveSet:
     """
 
     def __init__(
-        self,
-        S: Floats,
-        free: NDArray[np.bool_],
-        tangential: int,
-        motions: Floats | None = None,
-        systems: Systems | None = None,
+        self, S: Floats, free: Bools, tangential: int, motions: Floats | None = None, systems: Systems | None = None
     ) -> None:
         self._t, self._systems = tangential, systems or Systems(S, free, motions)
         self._held = None if free[:tangential].all() else ~free[:tangential]
         self._stiffness = float(np.diag(S).max())
 
-    def _begin(self, start: Pattern, smooth: NDArray[np.bool_], hint: Pattern | None) -> Pattern:
+    def _begin(self, start: Pattern, smooth: Bools, hint: Pattern | None) -> Pattern:
         """Return the first guess: no held node slides, every node whose bound is zero does.
 
         A hint takes the place of the start, except for the direction of nodes whose bound is zero: nothing mends that.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from verification.dense import times, worst
 
 #: A solution of step II is accepted below this relative residual.
@@ -48,7 +47,7 @@ class KKTCertificate:
     checked only on the ``free`` components.
     """
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_] | None = None) -> None:
+    def __init__(self, S: Floats, free: Bools | None = None) -> None:
         self._S, self._stiffness = S, float(np.diag(S).max())
         self._held = None if free is None or free.all() else ~free
 

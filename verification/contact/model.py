@@ -6,10 +6,9 @@ import warnings
 
 import cvxpy as cp
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 
 #: Clarabel's defaults leave errors of 1e-4 in the energy; asking for more than this may end "almost solved" far off.
 TOLERANCE = 1e-10
@@ -28,7 +27,7 @@ class ContactModel:
     of S.
     """
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, motions: int = 0) -> None:
+    def __init__(self, S: Floats, free: Bools, tangential: int, motions: int = 0) -> None:
         rows = np.flatnonzero(free)
         self._rows = rows
         self._stiffness = float(np.diag(S).max())

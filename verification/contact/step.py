@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from verification.contact.active_set import ActiveSet, Pattern, Systems
 from verification.contact.kkt import KKT, TOLERANCE, KKTCertificate
 from verification.dense import STILL
@@ -81,7 +80,7 @@ class ContactStep:
     def __init__(
         self,
         S: Floats,
-        free: NDArray[np.bool_],
+        free: Bools,
         tangential: int,
         solver: Solver = "auto",
         near: str = "",

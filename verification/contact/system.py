@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats, Ints
-from verification.contact.active_set import Pattern
+from verification.contact.active_set import Pattern, Signs
 from verification.dense import STILL, worst
 
 #: A solution is accepted below this relative KKT residual.
@@ -36,7 +35,7 @@ class SolveError(RuntimeError):
 class Branches(Pattern):
     """The branch of each complementarity condition: the state of each node, and the sign of S lambda_N, shape (t,)."""
 
-    threshold: NDArray[np.int8]
+    threshold: Signs
 
     @cached_property
     def key(self) -> bytes:

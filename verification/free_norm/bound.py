@@ -13,6 +13,7 @@ from ndtheory.number import Numeric, above
 from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, rest_of, trace
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
+from verification.semidefinite import LMIError
 from verification.semidefinite.bound import asked, pair_of
 
 if TYPE_CHECKING:
@@ -73,7 +74,6 @@ class FreeNormBound(Bound):
     apart = on_request = certifies = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
-        from verification.semidefinite.interior_point import LMIError
 
         try:
             pair, measured, chosen = asked(subject, theta)
@@ -111,7 +111,6 @@ class FreeNormBound(Bound):
     ) -> Enclosure:
         from verification.free_norm.norm import FreeNorm
         from verification.free_norm.radius import largest_radius
-        from verification.semidefinite.interior_point import LMIError
         from verification.semidefinite.lipschitz import Enclosure, Leaf
         from verification.semidefinite.multipliers import Certified
 
@@ -140,7 +139,6 @@ class FreeNormBound(Bound):
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
         pair, measured = pair_of(subject, "needed a pair of bodies with a law of friction", law=True)
         from verification.free_norm.norm import FreeNorm
-        from verification.semidefinite.interior_point import LMIError
 
         def interval(k: float) -> tuple[float, float] | None:
             progress(f"free norm: largest theta at k = {k:.3g}", None)
@@ -239,7 +237,6 @@ def _verified(
 def _friction(pair: ContactPair, measured: Measured, progress: Progress) -> tuple[float, Proved] | None:
     """The friction up to which every small theta contracts; None where none is found, or friction has no law."""
     from verification.free_norm.norm import friction_threshold
-    from verification.semidefinite.interior_point import LMIError
 
     if measured.friction_threshold is None:
         return None

@@ -24,8 +24,9 @@ import numpy as np
 from scipy.linalg import eigvalsh, solve_discrete_are
 
 from fem1d2d.mesh import Floats
+from verification.semidefinite import LMIError
 from verification.semidefinite.conditions import times
-from verification.semidefinite.interior_point import Indices, LMIError, Program, Stop, Weights, solve
+from verification.semidefinite.interior_point import Indices, Program, Stop, Weights, solve
 from verification.semidefinite.multipliers import QuadraticForms
 
 #: Points of a half circle at which M is looked at; those that a program begins with, and the most that it has.

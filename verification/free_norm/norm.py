@@ -19,13 +19,15 @@ from fem1d2d.mesh import Floats
 from ndtheory.continuum.circle import disk
 from verification.algorithm.rates import ForceNorm
 from verification.constants import Measured
+from verification.dense import symmetric
 from verification.free_norm.circle import ABOVE, Circle, Circles
 from verification.free_norm.radius import radius
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
+from verification.semidefinite import LMIError
 from verification.semidefinite.conditions import times
-from verification.semidefinite.interior_point import LMIError, Weights
+from verification.semidefinite.interior_point import Weights
 from verification.semidefinite.multipliers import QuadraticForms, on_the_safe_side
 from verification.semidefinite.pattern_search import factor_search
 
@@ -158,7 +160,7 @@ class FreeNorm:
         """
         back = solve_triangular(self.pair.neumann.root, np.eye(len(norm)), lower=True)
         Q = back.T @ norm @ back
-        Q = (Q + Q.T) / 2
+        Q = symmetric(Q)
         holds = self.forms.traces.in_norm(Q, multipliers, step=(theta, 1 - theta))
         if factor is None:
             square = self._least_square(theta, norm, multipliers)

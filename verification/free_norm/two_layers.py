@@ -17,7 +17,7 @@ from ndtheory.moduli import Moduli
 from verification.document import Document
 from verification.free_norm.numbers import Found, numbers, proved, with_friction
 from verification.free_norm.search import Search, comparable
-from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite import LMIError
 
 #: The keys of what was given.
 INPUTS = {

@@ -21,6 +21,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.theta import CLOSEST_TO_ONE
 from verification.constants import measure
 from verification.contact import ContactError
+from verification.dense import symmetric
 from verification.interface.body import Body
 from verification.ledger.cases import CONVERGENT, PLANE
 from verification.ledger.evidence import Evidence, Level, figure
@@ -129,7 +130,7 @@ def there_and_back(case: Case) -> float:
     blocks = np.split(np.eye(interface.contact.size), interface.contact.dimension)
     back = mortar(interface.neumann.x, x)
     form = stiffness @ interface.carry(np.concatenate([back @ block for block in blocks]))
-    return float(eigvalsh((form + form.T) / 2, stiffness)[0])
+    return float(eigvalsh(symmetric(form), stiffness)[0])
 
 
 def forces_carry_displacements(setting: RunsOfLevel) -> list[Evidence]:

@@ -15,14 +15,14 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
+from verification.dense import symmetric
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
 from verification.semidefinite.losses import LossForms, square, top
@@ -45,7 +45,7 @@ def lifted_energy(body: Body) -> Floats:
     fields[elastic.interface] = np.eye(len(elastic.interface))
     fields[elastic.inside] = elastic.lift
     energy = fields.T @ (body.stiffness @ fields)
-    return np.asarray((energy + energy.T) / 2)
+    return symmetric(energy)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -309,7 +309,7 @@ def uniform_piece(pair: ContactPair, *, touching: bool, sliding: int) -> Piece:
     """The piece on which all nodes have one state."""
     t = pair.contact.grid.t
     pattern = Pattern(touching=np.full(pair.contact.grid.n, touching), sliding=np.full(t, sliding, dtype=np.int8))
-    still: NDArray[np.bool_] = np.zeros(pair.neumann.grid.n, dtype=bool)
+    still: Bools = np.zeros(pair.neumann.grid.n, dtype=bool)
     return Piece(pair=pair, pattern=pattern, sign=signs(pair), still=still)
 
 

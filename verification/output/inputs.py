@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from verification.algorithm.runs import Run, run
+from verification.algorithm.runs import run
 from verification.interface.pair import pair_from
 from verification.output.files import check_folder, staged
 from verification.problem.examples import example, examples
@@ -44,12 +44,15 @@ def write_inputs(folder: Path) -> None:
     check_folder(folder, " (--inputs)")
     pair = pair_from(example("section6"))
     made, built_in = run(pair, theta="0.5"), examples()
+    log = ["  TimeWindow  Iteration  ResRel(Force)"]  # as preCICE writes convergence logs
+    log += [f"{1:6d}  {each.iteration + 1:6d}  {each.relative_residual:16.8e}" for each in made.iterates]
     texts = {"my.toml": built_in["section6"], "history.toml": built_in["history"], "grid.toml": GRID}
+    texts["convergence.log"] = "\n".join(log)
     arrays = {f"S{i}.npy": side.schur for i, side in enumerate(pair.along_y, 1)}
     arrays |= {"X.npy": np.array([each.g for each in made.iterates])}
     arrays |= {"TX.npy": np.array([each.image for each in made.iterates])}
     with staged(folder) as room:
-        for name, text in (texts | {"convergence.log": _log(made)}).items():
+        for name, text in texts.items():
             (room / name).write_text(text.rstrip() + "\n", encoding="utf-8")
         for name, array in arrays.items():
             np.save(room / name, array)
@@ -58,10 +61,3 @@ def write_inputs(folder: Path) -> None:
             if there.exists() and there.read_bytes() != (room / name).read_bytes():
                 needed = "this file has another content: needed another folder (--inputs)"
                 raise ProblemError(str(there), "", None, needed)
-
-
-def _log(made: Run) -> str:
-    """The relative residuals of a run in the form of preCICE's convergence logs."""
-    lines = ["  TimeWindow  Iteration  ResRel(Force)"]
-    lines += [f"{1:6d}  {each.iteration + 1:6d}  {each.relative_residual:16.8e}" for each in made.iterates]
-    return "\n".join(lines)

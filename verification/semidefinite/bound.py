@@ -10,7 +10,7 @@ from ndtheory.number import Numeric
 from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, rest_of, trace
 from verification.machine.progress import Progress, silent
 from verification.registry import BOUNDS
-from verification.semidefinite import LARGEST
+from verification.semidefinite import LARGEST, LMIError
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -58,7 +58,6 @@ class SemidefiniteBound(Bound):
     apart = certifies = divides = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
-        from verification.semidefinite.interior_point import LMIError
         from verification.semidefinite.lipschitz import work_out
 
         try:
@@ -116,7 +115,6 @@ class SemidefiniteBound(Bound):
         return enclose(pair, forms, theta, gap=gap, programs=programs, progress=progress)
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
-        from verification.semidefinite.interior_point import LMIError
         from verification.semidefinite.lipschitz import thetas
 
         pair, measured = pair_of(subject, "needed a pair of bodies with a law of friction", law=True)

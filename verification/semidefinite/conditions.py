@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from ndtheory.energy_norms import turning_theta, worst_ratio
 from verification.constants import Measured
-from verification.dense import STILL
+from verification.contact.active_set import Signs
+from verification.dense import STILL, symmetric
 from verification.interface.pair import ContactPair
 from verification.machine.threads import one_thread
 from verification.semidefinite import LARGEST
 from verification.semidefinite.interior_point import Optimum, Program, Weights
 from verification.semidefinite.trace_forms import TraceForms, families, weighed
 
-Signs = NDArray[np.int8]
 Cones = NDArray[np.intp]
 
 
@@ -55,7 +55,7 @@ class Pieces:
         return bool(self.signs.any() or self.normal.any() or self.slip.any())
 
     @property
-    def zeros(self) -> tuple[NDArray[np.bool_], ...]:
+    def zeros(self) -> tuple[Bools, ...]:
         """The nodes at which the jump, the normal force, the slip and ``p_T - eps w k zeta`` are 0."""
         return self.normal > 0, self.normal < 0, self.slip < 0, self.slip > 0
 
@@ -133,7 +133,7 @@ class Conditions:
     def conditions(self, multipliers: Weights) -> Floats:
         """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
         total = weighed(multipliers, self.families)
-        return np.asarray(total + total.T) / 2
+        return symmetric(total)
 
     def inner(self, one: Floats, other: Floats) -> Floats:
         """The inner product of two linear forms in the norm of the factor: (5.21), Euclidean in these coordinates.
@@ -151,7 +151,7 @@ class Conditions:
     def cross(self) -> Floats:
         """The form ``<g, p>``."""
         cross = self.inner(self.g, self.p)
-        return np.asarray(cross + cross.T) / 2
+        return symmetric(cross)
 
     def fixed(self, theta: float) -> Floats:
         """The form ``-|theta p + (1 - theta) g|^2``: what is left of a difference of forces after one step."""

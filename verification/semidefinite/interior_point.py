@@ -23,7 +23,9 @@ from scipy.linalg.blas import dsymv, dtrmm, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf, dpotri, dstev
 
 from fem1d2d.mesh import Floats
+from verification.dense import symmetric
 from verification.machine.threads import one_thread
+from verification.semidefinite import LMIError
 
 #: Steps after which it ends anyway; 10 to 15 are usual.
 MOST_STEPS = 60
@@ -55,10 +57,6 @@ Indices = NDArray[np.intp]
 #: lambda, tau, a, b by node; lambda alone without friction.  Where something is fixed at nodes, also what multiplies
 #: w k zeta v_T, v_N^2, p_N^2, p_T^2 and p_T sqrt(w k) zeta.
 Weights = tuple[Floats, ...]
-
-
-class LMIError(RuntimeError):
-    """No multipliers that certify anything were found."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +151,7 @@ class MatrixBlock:
         """The part of the slack that is linear in (s, y), shape (1, d, d)."""
         by_row = y[1:] if self.tie is None else self.tie @ y[1:]
         half = self.left.T @ (by_row[:, None] * self.right)
-        return np.asarray((y[0] * self.free - (half + half.T) / 2)[None])
+        return np.asarray((y[0] * self.free - symmetric(half))[None])
 
     def adjoint(self, matrix: Floats, total: Floats) -> None:
         """Add the inner products of the coefficients of (s, y) with a symmetric matrix."""
@@ -195,7 +193,7 @@ class MatrixBlock:
         X_ab, Z_ab = X_rows[ab], Z_rows[ab]
         part = X_rows[bb] * Z_rows[aa] + X_rows[aa] * Z_rows[bb] + X_ab.T * Z_ab + X_ab * Z_ab.T
         M[1:, 1:] += self._tied(part / 4)
-        product = _symmetric(X[0][:, self._weighed] @ self._weights @ inverse[0][self._weighed])
+        product = symmetric(X[0][:, self._weighed] @ self._weights @ inverse[0][self._weighed])
         mixed = np.zeros(len(M))
         self.adjoint(product[None], mixed)
         M[0] += mixed
@@ -299,7 +297,7 @@ def solve(program: Program) -> Optimum:
             centring = min(max(left, 0.0) ** max(1.0, 3 * shorter**2), 1.0)
             mu = centring * gap / order
             dy, dZ, _, dX = newton.step(
-                [mu * z - _symmetric(d @ t) for z, d, t in zip(inverse, dX, turned, strict=True)]
+                [mu * z - symmetric(d @ t) for z, d, t in zip(inverse, dX, turned, strict=True)]
             )
             share = 0.9 + 0.09 * shorter
             along_Z = min(share * _longest(blocks, roots, dZ), 1.0)
@@ -337,7 +335,7 @@ class _Newton:
         dy = self.eliminate(right)
         dZ = [block.linear(dy) for block in self.blocks]
         turned = [d @ z for d, z in zip(dZ, self.inverse, strict=True)]
-        dX = [-x - _symmetric(x @ t) for x, t in zip(self.X, turned, strict=True)]
+        dX = [-x - symmetric(x @ t) for x, t in zip(self.X, turned, strict=True)]
         return dy, dZ, turned, dX if wanted is None else _moved(wanted, 1.0, dX)
 
 
@@ -393,10 +391,6 @@ def _elimination(M: Floats) -> Callable[[Floats], Floats]:
 
 def _turned(matrices: Floats) -> Floats:
     return np.swapaxes(matrices, -1, -2)
-
-
-def _symmetric(matrices: Floats) -> Floats:
-    return np.asarray((matrices + _turned(matrices)) / 2)
 
 
 def _inner(X: list[Floats], Z: list[Floats]) -> float:

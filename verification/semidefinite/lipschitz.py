@@ -18,8 +18,8 @@ from itertools import count
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fem1d2d.mesh import Bools
 from ndtheory import Number
 from ndtheory.keys import Part, derived, key, says
 from ndtheory.number import above, below
@@ -27,11 +27,13 @@ from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import ForceNorm
 from verification.certificate.claims import Confirmation, NoCertificate
 from verification.constants import Measured
+from verification.contact.active_set import Signs
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
-from verification.semidefinite.conditions import TINY, Pieces, Signs
-from verification.semidefinite.interior_point import LMIError, Optimum, Stop, Weights
+from verification.semidefinite import LMIError
+from verification.semidefinite.conditions import TINY, Pieces
+from verification.semidefinite.interior_point import Optimum, Stop, Weights
 from verification.semidefinite.mirror import Mirror
 from verification.semidefinite.multipliers import Certified, QuadraticForms, friction_threshold
 from verification.semidefinite.pattern_search import factor_search
@@ -245,7 +247,7 @@ def _division(forms: QuadraticForms, leaf: Leaf, lower: float) -> tuple[str, int
     return None
 
 
-def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[NDArray[np.bool_], Signs]]:
+def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[Bools, Signs]]:
     """State of each node, touching and sliding, in the pairs of forces that are worst in the moments of a leaf."""
     if leaf.proposal is None:
         return

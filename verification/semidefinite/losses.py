@@ -21,6 +21,7 @@ from ndtheory import PRINTED, REPAIRED
 from ndtheory import bounds as formulas
 from verification.bounds.losses import Loss, Losses
 from verification.constants import Measured
+from verification.dense import symmetric
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
@@ -127,7 +128,7 @@ def top(form: Floats, against: Floats | None = None) -> float:
 def square(rows: Floats, gram: Floats) -> Floats:
     """``rows' gram rows``, symmetric to the last digit."""
     form = rows.T @ gram @ rows
-    return np.asarray(form + form.T) / 2
+    return symmetric(form)
 
 
 def locate(pair: ContactPair, measured: Measured, *, progress: Progress = silent) -> Losses | None:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag, solve_triangular
 
 from fem1d2d.mesh import Floats
+from verification.dense import symmetric
 from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 from verification.semidefinite.conditions import Conditions, Pieces
@@ -64,7 +65,7 @@ class Mirror:
     @cached_property
     def modes(self) -> tuple[Floats, int]:
         """An orthonormal basis of (g, d_1), shape (d, d): first what a reflection turns round, and how much it is."""
-        values, columns = zip(*(np.linalg.eigh((turn + turn.T) / 2) for turn in self.turns), strict=True)
+        values, columns = zip(*(np.linalg.eigh(symmetric(turn)) for turn in self.turns), strict=True)
         odd = np.concatenate(values) < 0
         basis = block_diag(*columns)
         return np.hstack([basis[:, odd], basis[:, ~odd]]), int(odd.sum())
@@ -87,7 +88,7 @@ class Mirror:
     @cached_property
     def parts(self) -> tuple[Floats, ...]:
         """An orthonormal basis of d_1 in two parts: what a reflection turns round, and what it does not."""
-        values, columns = np.linalg.eigh((self.turns[1] + self.turns[1].T) / 2)
+        values, columns = np.linalg.eigh(symmetric(self.turns[1]))
         return columns[:, values < 0], columns[:, values >= 0]
 
     def halved(self, program: Program) -> tuple[Program, Indices]:

@@ -9,7 +9,8 @@ import cvxpy as cp
 import numpy as np
 
 from verification.machine.threads import one_thread
-from verification.semidefinite.interior_point import LMIError, Optimum, Program
+from verification.semidefinite import LMIError
+from verification.semidefinite.interior_point import Optimum, Program
 
 
 def solve(program: Program, *, solver: str = cp.CLARABEL, **options: Any) -> Optimum:

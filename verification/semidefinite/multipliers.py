@@ -33,9 +33,9 @@ from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
-from verification.semidefinite import interior_point
+from verification.semidefinite import LMIError, interior_point
 from verification.semidefinite.conditions import Conditions, Pieces, inside, mixed, times
-from verification.semidefinite.interior_point import USUAL, LMIError, Optimum, Program, Stop, Weights
+from verification.semidefinite.interior_point import USUAL, Optimum, Program, Stop, Weights
 from verification.semidefinite.mirror import Mirror
 
 #: The friction threshold is searched until its bracket is this narrow, relatively.

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from verification.algorithm.affine_piece import Piece
-from verification.contact.active_set import Pattern
-from verification.dense import pinned, vanishing
+from verification.contact.active_set import Pattern, Signs
+from verification.dense import pinned, symmetric, vanishing
 from verification.interface.body import Condensed
 from verification.interface.pair import ContactPair
 
@@ -30,8 +30,8 @@ NEAR = 1e-3
 class Patterns:
     """States of the contact nodes on several pieces: ``touching``, shape (c, n), and ``sliding``, shape (c, t)."""
 
-    touching: NDArray[np.bool_]
-    sliding: NDArray[np.int8]
+    touching: Bools
+    sliding: Signs
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,7 +77,7 @@ def values(factors: tuple[Floats, Floats]) -> Floats:
 def form_of(factors: tuple[Floats, Floats]) -> Floats:
     """The matrix of a form from its factors for a basis of forces."""
     form = factors[0] @ factors[1].T
-    return np.asarray(form + form.T) / 2
+    return symmetric(form)
 
 
 def answers(piece: Piece) -> Responses:
@@ -89,7 +89,7 @@ def answers(piece: Piece) -> Responses:
     return Responses(pair=pair, g=root.T, d_1=(carried + jump).T, jump=jump.T, reaction=(piece.reaction @ root).T)
 
 
-def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np.int8]) -> Responses:
+def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: Signs) -> Responses:
     """Answers of T to a change of force g, shape (2 n,), on several pieces; ``sign`` is the one of S sigma_N."""
     contact, t = pair.contact, pair.contact.grid.t
     carried = pair.interface.carry(pair.neumann.flexibility(g))
@@ -123,7 +123,7 @@ class Neighbours:
         pattern: Pattern,
         patterns: Patterns,
         node: NDArray[np.intp],
-        sign: NDArray[np.int8],
+        sign: Signs,
         factors: Factors,
     ) -> None:
         self._node = node = node.reshape(len(node), -1)
@@ -184,7 +184,7 @@ class Neighbours:
         added = change * (2 * mixed + self._squares @ change)
         return np.where(self._unknown, -np.inf, values(here) + added.sum(axis=(1, 2)))
 
-    def exceed(self, level: float, eigenvalues: Floats, eigenvectors: Floats) -> NDArray[np.bool_]:
+    def exceed(self, level: float, eigenvalues: Floats, eigenvectors: Floats) -> Bools:
         """True for neighbours whose largest eigenvalue is above a level, or may be; borderline cases fall either way.
 
         On a neighbour the form is ``form + W K W'``, and it has as many eigenvalues above the level as
@@ -213,7 +213,7 @@ class Neighbours:
         return np.asarray((np.linalg.eigvalsh(small) < 0).sum(axis=1) > k) | self._unknown
 
 
-def _bound(pair: ContactPair, forces: Floats, sign: NDArray[np.int8]) -> Floats:
+def _bound(pair: ContactPair, forces: Floats, sign: Signs) -> Floats:
     """Changes of the friction bound by columns of forces, shape (t, m)."""
     t = pair.contact.grid.t
     if not pair.rubs:
@@ -222,17 +222,17 @@ def _bound(pair: ContactPair, forces: Floats, sign: NDArray[np.int8]) -> Floats:
     return np.asarray(size[:, None] * pair.interface.stress(forces))
 
 
-def _moves(pair: ContactPair, patterns: Patterns) -> NDArray[np.bool_]:
+def _moves(pair: ContactPair, patterns: Patterns) -> Bools:
     """True where step II leaves the jump free, shape (c, 2 n)."""
     return np.concatenate([patterns.sliding != 0, ~patterns.touching], axis=1) & pair.contact.free
 
 
-def _leave_free(contact: Condensed, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _leave_free(contact: Condensed, still: Bools) -> Bools:
     """True if a rigid motion of the body leaves all ``still`` components where they are, shape (c,)."""
     return np.array([vanishing(contact.motions, np.flatnonzero(row)).shape[1] > 0 for row in still])
 
 
-def _exchanged(contact: Condensed, moves: NDArray[np.bool_]) -> Floats:
+def _exchanged(contact: Condensed, moves: Bools) -> Floats:
     """The principal pivot transform of S_1: with ``f = S_1 d`` it takes f where moves and d elsewhere to the others.
 
     Motions that are left free are pinned.

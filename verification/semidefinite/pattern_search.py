@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.linalg.lapack import dpotrf
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import ForceNorm
-from verification.contact.active_set import Pattern
+from verification.contact.active_set import Pattern, Signs
 from verification.interface.pair import ContactPair
 from verification.machine.threads import one_thread
 from verification.semidefinite.neighbours import (
@@ -61,7 +61,7 @@ class FoundFactor:
         return float(np.abs(self.eigenvalues).max())
 
 
-def signs(pair: ContactPair) -> NDArray[np.int8]:
+def signs(pair: ContactPair) -> Signs:
     """Signs that S sigma_N has for some forces, shape (t,): 0 only where a row of S vanishes, or without friction."""
     kernel = pair.interface.kernel
     if not pair.rubs or kernel is None:
@@ -93,32 +93,32 @@ class Search:
         self._reached = np.ones(pair.contact.grid.n, dtype=bool)
         self._reached[: len(self.sign)] = (self.sign != 0) | (not pair.rubs)
 
-    def extremes(self) -> list[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
+    def extremes(self) -> list[tuple[Bools, Signs]]:
         """Two patterns: all nodes stick that can, all are open and slide one way."""
         n, t = self.pair.contact.grid.n, self.pair.contact.grid.t
         stick = 0 if self.pair.rubs else 1
         what = ((True, stick), (False, self.states[-1][1]))
         return [(np.full(n, touching), np.full(t, slides, dtype=np.int8)) for touching, slides in what]
 
-    def random_pattern(self, random: np.random.Generator) -> tuple[NDArray[np.bool_], NDArray[np.int8]]:
+    def random_pattern(self, random: np.random.Generator) -> tuple[Bools, Signs]:
         """A random pattern."""
         chosen = [self.states[i] for i in random.integers(len(self.states), size=self.pair.contact.grid.n)]
         touching, sliding = (np.array(column) for column in zip(*chosen, strict=True))
         return touching, sliding[: self.pair.contact.grid.t]
 
-    def piece(self, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> Piece:
+    def piece(self, touching: Bools, sliding: Signs) -> Piece:
         """The piece of a pattern, but that a node without a friction bound slides."""
         sliding = np.where(self._reached[: len(sliding)] | (sliding != 0), sliding, 1).astype(np.int8)
         pattern = Pattern(touching=np.asarray(touching, dtype=bool), sliding=sliding)
         return Piece(pair=self.pair, pattern=pattern, sign=self.sign, still=self._still)
 
-    def found(self, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> FoundFactor:
+    def found(self, touching: Bools, sliding: Signs) -> FoundFactor:
         """The largest value of the form on the piece of a pattern."""
         found = self.above(-np.inf, touching, sliding)
         assert found is not None
         return found
 
-    def above(self, level: float, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> FoundFactor | None:
+    def above(self, level: float, touching: Bools, sliding: Signs) -> FoundFactor | None:
         """The same; None where its value is not above a level.
 
         A Cholesky factorisation decides that in a fraction of the time that the eigenvalues take.
@@ -158,7 +158,7 @@ class Search:
             better = next((found for found in tried if found is not None), None)
         return best
 
-    def _tried(self, best: FoundFactor, level: float) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
+    def _tried(self, best: FoundFactor, level: float) -> Iterator[tuple[Bools, Signs]]:
         """Patterns that may be better, the most promising first: by the change of force that is worst on the best."""
         patterns, node = self.neighbours(best.piece.pattern)
         beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
@@ -177,9 +177,7 @@ class Search:
         yield from zip(several.touching, several.sliding, strict=True)
         yield from ((patterns.touching[i], patterns.sliding[i]) for i in exceeds)
 
-    def _tried_side_by_side(
-        self, best: FoundFactor, level: float
-    ) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
+    def _tried_side_by_side(self, best: FoundFactor, level: float) -> Iterator[tuple[Bools, Signs]]:
         """Patterns that differ at two nodes side by side and are better up to rounding, the most promising first."""
         patterns, node = _side_by_side(best.piece.pattern, *self.neighbours(best.piece.pattern))
         if not len(node):  # a single contact node

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from verification.algorithm.monolithic import contact_system
+from verification.contact.active_set import Signs
 from verification.contact.system import ContactSystem
 from verification.interface.assembly import TwoBodies, discretise
 from verification.problem import Problem
@@ -33,7 +34,7 @@ NONE = 1e-12
 GROWS = 1e-9
 
 #: By node: open or touches; and slips to one side, sticks, slips to the other.  Rows: touches, slips; columns: nodes.
-Patterns = NDArray[np.int8]
+Patterns = Signs
 
 #: All states of one node.
 STATES = np.array([[a, b] for a in (0, 1) for b in (-1, 0, 1)], dtype=np.int8)
@@ -149,7 +150,7 @@ class SlipErrors:
         found = np.linalg.norm(self._root @ self.jacobians(patterns) @ np.linalg.inv(self._root), 2, axis=(1, 2))
         return np.where(self.possible(patterns), found, 0.0)
 
-    def possible(self, patterns: Patterns) -> NDArray[np.bool_]:
+    def possible(self, patterns: Patterns) -> Bools:
         """True for patterns that some loads cause: a node sticks where it has a friction bound."""
         bound, none = patterns[:, 0] @ self.friction.T, NONE * self.friction.sum(axis=1).max()
         return np.asarray(np.where(patterns[:, 1] == 0, bound > none, bound > -none).all(axis=1))

@@ -17,6 +17,7 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from fem1d2d.proofs.enclosed import Enclosed, gamma, upwards
 from fem1d2d.proofs.loewner import positive_definite
+from verification.dense import symmetric
 from verification.interface.pair import ContactPair
 
 Families = list[tuple[Floats, Floats]]
@@ -147,13 +148,13 @@ class TraceForms:
 
 def _changed(form: Floats, near: Sequence[Floats]) -> Floats:
     """A form in the coordinates of some columns, block by block on the diagonal; symmetric to the last digit."""
-    form = (form + form.T) / 2
+    form = symmetric(form)
     ends = np.cumsum([0, *(len(columns) for columns in near)])
     parts = [slice(*pair) for pair in pairwise(ends.tolist())]
     result = np.empty((sum(columns.shape[1] for columns in near),) * 2)
     for i, rows in enumerate(parts):
         for j, columns in enumerate(parts[: i + 1]):
             block = near[i].T @ form[rows, columns] @ near[j]
-            result[rows, columns] = block if i > j else (block + block.T) / 2
+            result[rows, columns] = block if i > j else symmetric(block)
             result[columns, rows] = result[rows, columns].T
     return result

@@ -26,7 +26,7 @@ from verification.contact import ContactError
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
-from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite import LMIError
 from verification.semidefinite.multipliers import QuadraticForms
 from verification.sweeps.pieces import KnownPieces
 from verification.sweeps.row import Row

@@ -65,7 +65,8 @@ class Affine:
     def __init__(self, piece: Piece, systems: Systems, factor: Floats) -> None:
         pair = self._pair = piece.pair
         contact, interface = pair.contact, pair.interface
-        self._key, self._sign, self._factor = key_of(piece), piece.sign[:, None], factor
+        self._key = piece.pattern, piece.sign.tobytes(), piece.still.tobytes()
+        self._sign, self._factor = piece.sign[:, None], factor
         self._limits = (float(pair.friction) * contact.grid.weights)[:, None]
         obstacle = interface.carry(pair.neumann.unloaded) + pair.offset
         trace = interface.carry(pair.neumann.inverse)
@@ -118,11 +119,6 @@ def lengths(columns: Floats) -> Floats:
     """Return the Euclidean norm of every column."""
     found: Floats = np.sqrt(np.einsum("ij,ij->j", columns, columns))
     return found
-
-
-def key_of(piece: Piece) -> Key:
-    """Return the key of a piece."""
-    return piece.pattern, piece.sign.tobytes(), piece.still.tobytes()
 
 
 class KnownPieces:

@@ -12,9 +12,8 @@ from itertools import count, groupby, repeat
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Bools, Floats
 from ndtheory import HypothesisError
 from ndtheory.energy_norms import one_minus_square
 from ndtheory.keys import Key
@@ -302,7 +301,7 @@ def _proved(setting: KnownPieces, rule: Rule, choice: Choice) -> tuple[Row, dict
 # --- how its run goes and ends ----------------------------------------------------------------------------------------
 
 
-def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
+def meets_paper_test(g: Floats, before: Floats) -> Bools:
     """Apply the test of Section 6.3, ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, to every column.
 
     Norms are Euclidean; the second part is in the unit of force of the file.

@@ -24,8 +24,7 @@ from verification.interface.files import read_interface, write_interface
 from verification.interface.pair import pair_from
 from verification.ledger.cases import problem
 from verification.registry import BOUNDS
-from verification.semidefinite import LARGEST
-from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite import LARGEST, LMIError
 from verification.semidefinite.multipliers import QuadraticForms
 
 BOUND = 0.5

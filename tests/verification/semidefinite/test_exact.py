@@ -10,9 +10,9 @@ from problem_list import blocks, small
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.semidefinite import interior_point
+from verification.semidefinite import LMIError, interior_point
 from verification.semidefinite.conditions import Pieces
-from verification.semidefinite.interior_point import LMIError, Stop
+from verification.semidefinite.interior_point import Stop
 from verification.semidefinite.lipschitz import Leaf, budget, enclose
 from verification.semidefinite.multipliers import QuadraticForms
 

@@ -11,8 +11,8 @@ from scipy.linalg import block_diag
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.semidefinite import interior_point, model
-from verification.semidefinite.interior_point import LMIError, Optimum, Program, Stop
+from verification.semidefinite import LMIError, interior_point, model
+from verification.semidefinite.interior_point import Optimum, Program, Stop
 from verification.semidefinite.multipliers import QuadraticForms
 
 SEEDS = list(islice((seed for seed in count() if case(seed)[0].contact.grid.n <= 4), 10 if AT_NIGHT else 5))

@@ -15,7 +15,7 @@ from strategies import AT_NIGHT
 
 from ndtheory import energy_norms
 from verification.interface.pair import ContactPair
-from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite import LMIError
 from verification.semidefinite.multipliers import NARROW, QuadraticForms, friction_threshold
 from verification.semidefinite.pattern_search import largest_factor, worst_piece
 

@@ -16,7 +16,7 @@ from fem1d2d.proofs.enclosed import UNIT, Enclosed
 from fem1d2d.proofs.loewner import positive_definite
 from verification.constants import measure
 from verification.interface.pair import pair_from
-from verification.semidefinite.interior_point import LMIError
+from verification.semidefinite import LMIError
 from verification.semidefinite.multipliers import QuadraticForms
 
 
