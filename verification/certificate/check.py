@@ -28,7 +28,7 @@ from flint import arb, arb_mat, ctx, fmpq
 UNREADABLE = (OSError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError, RecursionError, MemoryError)
 
 BLOCK = 32  # unknowns eliminated at once
-ALONG_AXES = ((1, 0), (0, 1))  # tangent and normal of a node that has no normal of its own
+ALONG_AXES = ((1, 0), (0, 1))  # tangent and normal where the body lists none
 
 Json = Any  # a part of the file
 Vector = Sequence[Any]  # in the plane; or the coefficients of a linear form
