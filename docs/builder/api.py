@@ -1,9 +1,15 @@
-"""One page of the API for each module, and the page that lists them; both are made from the packages as they are."""
+"""Pages of the API, made from the packages as they are: one for each module, their list, and the public names."""
 
 from __future__ import annotations
 
 import ast
+import inspect
+import re
+import typing
 from pathlib import Path
+from typing import Any
+
+import verification as vf
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("ndtheory", "fem1d2d", "verification")
@@ -29,6 +35,66 @@ HEAD = """# All modules
 Every module of the three packages has a page with its functions and classes. {doc}`/architecture` says which of them
 may import which.
 """
+
+
+#: The public names of ``verification`` in the order of what a reader does with them.
+TASKS = {
+    "Describe a problem": ("load", "example", "Problem", "ProblemError"),
+    "Run the iteration, or solve both bodies at once": (
+        *("run", "Run", "iterate", "Iterate", "march", "History"),
+        *("solve", "Solution", "SolveError", "ContactError"),
+    ),
+    "Measure constants, evaluate bounds, check the paper": (
+        *("measure", "Measured", "compare", "Comparison", "verify", "Ledger"),
+    ),
+    "Prove that a step contracts": ("certify", "check_again"),
+    "Choose the roles and theta of a coupling": (
+        *("advise", "advise_matrices", "advise_vectors", "advise_logs", "advise_run", "advise_moduli", "Advice"),
+    ),
+    "Couple two solvers": ("couple", "Coupling"),
+    "Make many runs, and keep results": ("sweep", "Sweep", "explore", "Exploration", "schema"),
+    "Add parts of your own": ("build", "ContactPair", "Rule", "Law"),
+}
+
+
+def summary(one: Any) -> str:
+    """First sentence of a docstring as Markdown, with the targets of its roles as code."""
+    text = (inspect.getdoc(one) or "").partition("\n\n")[0].replace("\n", " ")
+    return re.sub(r":\w+:`~?([^`]+)`", r"`\1`", text)
+
+
+def place(one: Any) -> str:
+    """Name under which the pages of modules have a function or a class."""
+    return f"{one.__module__}.{one.__qualname__}"
+
+
+def link(one: Any, words: str = "") -> str:
+    """A function or a class as a link in Markdown; what is not ours has no page."""
+    if not one.__module__.startswith(PACKAGES):
+        return f"`{one.__qualname__}`"
+    return f"{{py:{'class' if inspect.isclass(one) else 'func'}}}`{words or one.__qualname__} <{place(one)}>`"
+
+
+def returned(one: Any) -> str:
+    """Result of a call as Markdown; a class returns none."""
+    if inspect.isclass(one):
+        return ""
+    found = typing.get_type_hints(one)["return"]
+    parts = [part for part in typing.get_args(found) if part.__module__.startswith(PACKAGES)]
+    return f"iterator of {link(*parts)}" if parts else link(typing.get_origin(found) or found)
+
+
+def calls() -> str:
+    """The public names of ``verification`` by task, as Markdown."""
+    parts = []
+    for task, names in TASKS.items():
+        parts += [f"**{task}**", "", "| name | returns | meaning |", "|---|---|---|"]
+        for name in names:
+            one = getattr(vf, name)
+            meaning = summary(one).replace("|", r"\|")
+            parts.append(f"| {link(one, f'vf.{name}')} | {returned(one)} | {meaning} |")
+        parts.append("")
+    return "\n".join(parts)
 
 
 def modules(root: Path = ROOT) -> dict[str, Path]:

@@ -16,7 +16,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
 import verification as vf
-from builder import course, documents, equations, notebooks, slides, widgets
+from builder import api, course, documents, equations, notebooks, slides, widgets
 from builder.references import References
 from verification import schemas
 from verification.problem import specs
@@ -81,6 +81,15 @@ class KeysDirective(SphinxDirective):
             raise self.error(f"keys {name!r}: needed one of {'; '.join(schemas.tables())}")
         self.env.note_dependency(str(Path(schemas.__file__).with_suffix(".toml")))
         return list(self.parse_text_to_nodes(documents.table(name)))
+
+
+class CallsDirective(SphinxDirective):
+    """``{calls}``: the public names of ``verification``, by task."""
+
+    def run(self) -> list[nodes.Node]:
+        for path in api.modules().values():
+            self.env.note_dependency(str(path))
+        return list(self.parse_text_to_nodes(api.calls()))
 
 
 class gallery(nodes.General, nodes.Element):
@@ -251,6 +260,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("widget", WidgetDirective)
     app.add_directive("course", CourseDirective)
     app.add_directive("keys", KeysDirective)
+    app.add_directive("calls", CallsDirective)
     app.add_role("slides", slides.SlidesRole())
     app.connect("html-collect-pages", slides.write_decks)
     app.connect("source-read", say_needs)

@@ -2,7 +2,10 @@
 
 import importlib
 import pkgutil
+import re
 from pathlib import Path
+
+import verification as vf
 
 
 def test_each_module_but_those_of_commands_has_a_page(builder):
@@ -42,3 +45,25 @@ def test_pages_of_modules_that_are_gone_are_removed(builder, tmp_path):
     pages = {path.name for path in (tmp_path / "made" / "api").iterdir()}
     assert pages == {"ndtheory.md", "fem1d2d.md", "verification.md"}
     assert "old" not in (tmp_path / "made" / "modules.md").read_text("utf-8")
+
+
+ROW = re.compile(r"\| \{py:\w+\}`vf\.(\w+) <([\w.]+)>` \| .* \| (.*) \|")
+
+
+def test_the_api_page_lists_each_public_name_once_with_its_place_and_meaning(builder):
+    rows = [ROW.fullmatch(line).groups() for line in builder.api.calls().splitlines() if line.startswith("| {")]
+    assert sorted(name for name, _, _ in rows) == sorted(vf.__all__)
+    modules = builder.api.modules()
+    for name, place, meaning in rows:
+        module, _, last = place.rpartition(".")
+        assert module in modules
+        assert getattr(importlib.import_module(module), last) is getattr(vf, name)
+        assert len(meaning.split()) > 1
+    assert "```{calls}\n```" in (Path(__file__).parents[2] / "docs" / "api" / "index.md").read_text("utf-8")
+
+
+def test_a_function_on_the_api_page_links_to_its_result(builder):
+    assert builder.api.returned(vf.iterate) == f"iterator of {builder.api.link(vf.Iterate)}"
+    assert builder.api.returned(vf.solve) == builder.api.link(vf.Solution)
+    assert builder.api.returned(vf.schema) == "`dict`"
+    assert builder.api.returned(vf.Run) == ""
