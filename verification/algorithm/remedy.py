@@ -96,7 +96,7 @@ def remedy_of(
     except ValueError:  # these roles are refused; problem errors are such
         other = 0.0
     exchanged = _typed(other) if other > good else None
-    if theta <= good:
+    if theta <= good and (outcome != "limit" or theta > good / 2):
         return Remedy(why=why, value=_typed(theta / 2), exchanged=exchanged, constant=constant)
     formula = f" (2/(2 + rho), rho = {rho:.3g})"
     return Remedy(why=why, value=_typed(good), formula=formula, exchanged=exchanged, constant=constant)

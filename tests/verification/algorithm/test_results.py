@@ -250,3 +250,14 @@ def test_with_other_settings_a_pair_runs_by_them(problem):
     pair = vf.build(problem)
     short = replace(pair, settings=replace(pair.settings, max_iterations=2))
     assert vf.run(short).iterations == 2
+
+
+def test_a_run_too_short_for_its_small_theta_is_not_advised_to_take_a_smaller_one(problem):
+    """Five steps at theta = 0.1 leave the residual and the joined state far from the solution, without a stall."""
+    short = problem.changed(theta="0.1", max_iterations=5)
+    run = vf.run(short)
+    assert run.outcome == "limit"
+    assert run.remedy.key == "iteration.theta"
+    assert float(run.remedy.value) > 0.1
+    longer = short.changed(theta=run.remedy.value, max_iterations=500)
+    assert vf.run(longer).converged
