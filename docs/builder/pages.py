@@ -16,9 +16,10 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
 import verification as vf
-from builder import api, course, documents, equations, notebooks, slides, widgets
+from builder import api, course, documents, equations, notebooks, remedies, slides, widgets
 from builder.references import References
 from verification import schemas
+from verification.algorithm import loop, remedy
 from verification.problem import specs
 
 
@@ -90,6 +91,15 @@ class CallsDirective(SphinxDirective):
         for path in api.modules().values():
             self.env.note_dependency(str(path))
         return list(self.parse_text_to_nodes(api.calls()))
+
+
+class RemediesDirective(SphinxDirective):
+    """``{remedies}``: the table of what to do after a run that did not converge."""
+
+    def run(self) -> list[nodes.Node]:
+        for module in (loop, remedy):
+            self.env.note_dependency(str(module.__file__))
+        return list(self.parse_text_to_nodes(remedies.table()))
 
 
 class gallery(nodes.General, nodes.Element):
@@ -261,6 +271,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("course", CourseDirective)
     app.add_directive("keys", KeysDirective)
     app.add_directive("calls", CallsDirective)
+    app.add_directive("remedies", RemediesDirective)
     app.add_role("slides", slides.SlidesRole())
     app.connect("html-collect-pages", slides.write_decks)
     app.connect("source-read", say_needs)

@@ -23,7 +23,17 @@ def builder():
     """The modules of ``docs/builder`` that need no Sphinx; they lie in a folder of scripts, not in a package."""
     sys.path.append(str(DOCS))
     try:
-        names = ("algorithm", "api", "cheat_sheet", "course", "equations", "notebooks", "questions", "widgets")
+        names = (
+            "algorithm",
+            "api",
+            "cheat_sheet",
+            "course",
+            "equations",
+            "notebooks",
+            "questions",
+            "remedies",
+            "widgets",
+        )
         return SimpleNamespace(**{name: import_module(f"builder.{name}") for name in names})
     finally:
         sys.path.remove(str(DOCS))
