@@ -45,6 +45,7 @@ docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -j $(JOBS) -W --keep-going -q -b html docs docs/_build/html
 	$(BIN)/python tests/docs/test_site.py docs/_build/html
 	PYTHONPATH=tests $(BIN)/python tests/docs/test_slides.py docs/_build/html
+	PYTHONPATH=tests $(BIN)/python tests/docs/test_search.py docs/_build/html
 	@echo "the site: docs/_build/html/index.html"
 
 nightly: $(VENV)/.test

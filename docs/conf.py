@@ -73,13 +73,11 @@ html_static_path = [
     "widgets",
     "slides",
     "generated/widgets",
+    "generated/search",
     str(distribution("sphinx-mathjax-offline").locate_file(f"sphinx-mathjax-offline/static/mathjax/{MATHJAX}")),
 ]
 html_css_files = ["site.css"]
 html_js_files = ["versions.js"]
-html_search_scorer = str(
-    Path(__file__).with_name("search_scores.js")
-)  # pages that explain come before those of the API
 mathjax_path = MATHJAX
 mathjax3_config = {
     "tex": {

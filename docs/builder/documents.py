@@ -46,20 +46,39 @@ FILE = {
 
 
 def file_table(name: str) -> str:
-    """A table of the problem file, in Markdown."""
-    return "\n".join(["| key | unit | meaning | default |", "|---|---|---|---|", *_file_lines(FILE[name])])
+    """A table of the problem file, in Markdown; each row has a place of its own."""
+    rows = [
+        f'| <span id="{anchor(full_name(name, key))}"></span>`{key}` | {unit} | {meaning} | {default} |'
+        for key, unit, meaning, default in file_rows(name)
+    ]
+    return "\n".join(["| key | unit | meaning | default |", "|---|---|---|---|", *rows])
 
 
-def _file_lines(cls: type, above: str = "", default: str = "") -> Iterator[str]:
+def full_name(table: str, key: str) -> str:
+    """A key with its table, as ``--set`` takes it."""
+    return key if table == "problem file" else f"{table.strip('[]')}.{key}"
+
+
+def anchor(full: str) -> str:
+    """The place of a key on the page on problem files."""
+    return f"key-{full.replace('.', '-').replace('_', '-')}"
+
+
+def file_rows(name: str) -> Iterator[tuple[str, str, str, str]]:
+    """The rows of a table of the problem file: key, unit, meaning and default."""
+    return _rows(FILE[name])
+
+
+def _rows(cls: type, above: str = "", default: str = "") -> Iterator[tuple[str, str, str, str]]:
     for name, one in entries(cls).items():
         if not (one.read or one.reader or one.shown):  # it has another table
             continue
         key = keys.keys(cls)[name]
         inside = key.table or keys.named_type(keys.annotation(cls, name))[1]
         if isinstance(inside, type) and issubclass(inside, Entries) and name != "parts":
-            yield from _file_lines(inside, f"{above}{name}.", one.shown)
+            yield from _rows(inside, f"{above}{name}.", one.shown)
         else:
-            yield f"| `{above}{name}` | {key.unit} | {key.says} | {default or _default(one)} |"
+            yield f"{above}{name}", str(key.unit or ""), str(key.says), str(default or _default(one))
 
 
 def _default(one: Entry) -> str:

@@ -16,7 +16,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
 import verification as vf
-from builder import api, course, documents, equations, notebooks, remedies, slides, widgets
+from builder import api, course, documents, equations, notebooks, remedies, search, slides, widgets
 from builder.references import References
 from verification import schemas
 from verification.algorithm import loop, remedy
@@ -149,13 +149,20 @@ def write_widgets(app: Sphinx, config: Config) -> None:
     vf.explore(vf.example("section6"), folder / "explore.html")
 
 
+def write_search(app: Sphinx, config: Config) -> None:
+    """The script of the search page, at the same time."""
+    search.write(Path(app.srcdir))
+
+
 def write_equations(app: Sphinx) -> None:
     """The index of equations, from the sources as they are."""
     (Path(app.srcdir) / "generated" / "equations.md").write_text(equations.page(), encoding="utf-8")
 
 
 def load_scripts(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
-    """Load the scripts of the widgets on the pages that show them, and on no other."""
+    """Load the scripts of the widgets on the pages that show them, that of the search on its page, and on no other."""
+    if page == "search":
+        app.add_js_file(search.FILE, loading_method="defer")
     shown = app.env.metadata.get(page, {}).get("widgets", ())
     for file in widgets.scripts(shown):
         app.add_js_file(file, loading_method="defer")
@@ -280,6 +287,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("doctree-read", keep_to_their_page)
     app.connect("doctree-resolved", fill_galleries)
     app.connect("config-inited", write_widgets)
+    app.connect("config-inited", write_search)
     app.connect("builder-inited", write_equations)
     app.connect("html-page-context", link_notebook)
     app.connect("html-page-context", load_scripts)

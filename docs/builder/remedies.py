@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import verification as vf
@@ -24,13 +25,13 @@ CASES: tuple[tuple[dict[str, Any], str], ...] = (
     (
         SOFT | {"max_iterations": 10},
         "Forces and displacements do not fit each other yet. Either theta is too large, so that nodes open and close in"
-        " turn, or it is so small that the run has too few steps. The screen has a theta between both.",
+        " turn, or it is so small that the run has too few steps. The message has a theta that avoids both.",
     ),
     (
         {"neumann_body": 2, "theta": "0.9"},
-        "Steps overshoot: an error is multiplied by up to $1 - \\theta(1 + \\rho)$, which is below $-1$. Take the theta"
-        " on the screen, or let the other body read the forces: {doc}`examples/which_side`. If a smaller theta stalls"
-        " too, friction may be too large for the iteration: `ndtheory solve` needs none.",
+        "Most often steps overshoot: they multiply some errors by $1 - \\theta(1 + \\rho)$, which is below $-1$. Take"
+        " the theta of the message, or let the other body read the forces: {doc}`examples/which_side`. If a smaller"
+        " theta stalls too, friction may be too large for the iteration: `ndtheory solve` needs none.",
     ),
     (
         {"tolerance": "1e-18"},
@@ -56,6 +57,7 @@ def _ended(changes: dict[str, Any], known: str) -> tuple[Outcome, str]:
     if run.remedy is None:
         raise ValueError(f"{changes}: needed a run that does not converge")
     why, _, advice = run.remedy.sentence("--theta", "--swap-roles").partition("; ")
+    advice = re.sub(r"--[a-z-]+(?: [\d.]+)?", r"`\g<0>`", advice)
     seen = f"{run.outcome.why[:1].upper()}{run.outcome.why[1:]}. " if "{" not in run.outcome.why else ""
     return run.outcome, f"| `{why}` | {advice} | {seen}{_cell(known)} |"
 

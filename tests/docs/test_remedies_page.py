@@ -13,6 +13,10 @@ def test_each_outcome_but_convergence_has_a_row_with_the_words_of_the_library(bu
     said = [re.fullmatch(r"\| `(.*)`", first)[1] for first, _, _ in rows]
     for outcome in {*Outcome} - {Outcome.CONVERGED}:
         assert any(words.startswith(outcome.words) for words in said)
+    assert (
+        re.search(r"--(?!-)", re.sub(r"`[^`]*`", "", builder.remedies.table().partition("\n|---|---|---|\n")[2]))
+        is None
+    )
     run = vf.run(vf.example("two-bars"), theta="0.6")
     why, _, advice = run.remedy.sentence().partition("; ")
     numbers = lambda text: re.sub(r"[\d.]+", "0", text)

@@ -269,7 +269,7 @@ class BodySpec(Loads):
         "ends `[a, b]`, a < b; an obstacle may have none", ends, _needed, "length", initial=None, only=_drawn
     )
     y: Ends | None = entry(
-        "the same", ends, _needed, "length", initial=None, only=lambda at: at["dimension"] == 2 and _drawn(at)
+        "as `x`, along y", ends, _needed, "length", initial=None, only=lambda at: at["dimension"] == 2 and _drawn(at)
     )
     cells: tuple[int, ...] | None = entry(
         "`[along x, along y]`, in one dimension one number",
