@@ -5,6 +5,7 @@
   const FACTORS = { words: 5, title: 4, name: 4, section: 3 }; // of a phrase with all words; a word in a text counts 1
   const LEAST = 0.5; // the share of the query that a result has at least, by the rarity of its words
   const UNKNOWN = 1.5; // the rarity of a word that no text has, as "not"
+  const NUMBER = 0.5; // that of a number: the index has none
   const stemmer = new Stemmer();
   const wordsOf = (text) =>
     splitQuery(text.toLowerCase().replace(/n['’]t\b|\bno\b|\bcannot\b/g, " not"))
@@ -24,8 +25,8 @@
       const near = [terms, titleterms].flatMap((table) => Object.keys(table).filter((one) => one.startsWith(stem)));
       [files, share] = [where(near), 0.5];
     }
-    const rarity = files.size ? Math.log(1 + docnames.length / files.size) : UNKNOWN;
-    return { stem, parts: partsOf(word), files, share, rarity };
+    const seen = files.size ? Math.log(1 + docnames.length / files.size) : UNKNOWN;
+    return { stem, parts: partsOf(word), files, share, rarity: /^\d+$/.test(word) ? NUMBER : seen };
   };
   // The share of a word of the query that a list of words has.
   const has = (words, { stem, parts }) => {
