@@ -89,6 +89,9 @@
       return [page, name, `#${anchor}`, `${kind}: ${meaning}`, exact * score, page, SearchResultKind.object];
     });
 
+  // From disk a browser fetches no page, so there is no summary to show.
+  if (location.protocol === "file:") DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
+
   Search._performSearch = (text, _terms, _excluded, _highlighted, objectTerms) => {
     _removeChildren(document.getElementById("search-progress"));
     const query = [...new Set(wordsOf(text))].map(term);

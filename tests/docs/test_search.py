@@ -178,7 +178,8 @@ TABLES = {
         ["--load", "file#run", "run: loads of a file", "option"],
     ],
 }
-STUBS = """const DOCUMENTATION_OPTIONS = {BUILDER: "html", FILE_SUFFIX: ".html", LINK_SUFFIX: ".html"};
+STUBS = """const DOCUMENTATION_OPTIONS = {BUILDER: "html", FILE_SUFFIX: ".html", LINK_SUFFIX: ".html",
+  SHOW_SEARCH_SUMMARY: true};
 const SPHINX_HIGHLIGHT_ENABLED = false, _ = text => text, Documentation = {gettext: _, ngettext: _};
 const _ready = start => document.addEventListener("DOMContentLoaded", start);
 const stopwords = new Set(["the", "what", "is", "it", "not", "does"]);
@@ -206,7 +207,9 @@ def searched(driver, tmp_path):
         while not driver.execute_script(done):
             pass
         links = "return [...document.querySelectorAll('li')].map(e => [e.querySelector('a').href, e.innerText])"
-        return [(link.rpartition("/")[2], text) for link, text in driver.execute_script(links)]
+        found = driver.execute_script(links)
+        assert driver.get_log("browser") == []  # from disk no page is fetched for a summary
+        return [(link.rpartition("/")[2], text) for link, text in found]
 
     return shown
 
