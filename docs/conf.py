@@ -19,7 +19,7 @@ BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path += [str(BENCHMARKS), str(Path(__file__).resolve().parent)]  # folders of scripts, not packages
 
 import speed_page  # noqa: E402
-from builder import api, cheat_sheet, commands  # noqa: E402
+from builder import api, cheat_sheet, commands, scripts  # noqa: E402
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -37,8 +37,11 @@ extensions = [
     "sphinx_proof",
     "sphinxcontrib.bibtex",
     "builder.pages",
+    "builder.scripts",
 ]
-exclude_patterns = ["_build", "generated/speed", "joss"]  # a page includes the second, the third is a paper
+# A page includes the second, the third is a paper, and the fourth are downloads.
+exclude_patterns = ["_build", "generated/speed", "joss", "generated/scripts/**.ipynb"]
+sphinx_gallery_conf = scripts.SETTINGS
 
 # Pages with code cells run at every build; a cell that fails fails the build.
 nb_execution_mode = "force"
@@ -69,6 +72,7 @@ if address := os.environ.get("SITE_URL"):
     html_baseurl = f"{address.rstrip('/')}/latest/"
 html_static_path = [
     "site.css",
+    "scripts.css",
     "versions.js",
     "widgets",
     "slides",
