@@ -39,7 +39,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "__init__ colours entries examples files readers reading specification specs steps tables writing"
         )
     },
-    "results, extras": {"verification": "document extras schemas"},
+    "results, extras": {"verification": "document exercises extras schemas"},
     "bodies": {
         "verification.interface": (
             "__init__ assembly body build checks draft drawn fields files friction interface join joining matrices "

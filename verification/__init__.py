@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from verification.coupling.from_problems import advise as advise
     from verification.coupling.from_runs import advise_run as advise_run
     from verification.coupling.from_vectors import advise_vectors as advise_vectors
+    from verification.exercises import check as check
     from verification.exploration.page import Exploration as Exploration
     from verification.exploration.page import explore as explore
     from verification.interface.build import build as build
@@ -88,6 +89,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "coupling.from_problems": ("advise",),
     "coupling.from_runs": ("advise_run",),
     "coupling.from_vectors": ("advise_vectors",),
+    "exercises": ("check",),
     "exploration.page": ("Exploration", "explore"),
     "interface.build": ("build",),
     "interface.interface": ("Law",),

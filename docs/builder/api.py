@@ -53,6 +53,7 @@ TASKS = {
     ),
     "Couple two solvers": ("couple", "Coupling"),
     "Make many runs, and keep results": ("sweep", "Sweep", "explore", "Exploration", "schema"),
+    "Check the answer to an exercise": ("check",),
     "Add parts of your own": ("build", "ContactPair", "Rule", "Law"),
 }
 

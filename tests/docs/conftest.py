@@ -23,8 +23,8 @@ def builder():
     """The modules of ``docs/builder`` that need no Sphinx; they lie in a folder of scripts, not in a package."""
     sys.path.append(str(DOCS))
     try:
-        names = ("algorithm", "api", "cheat_sheet", "commands", "course", "documents", "equations", "notebooks")
-        names += ("questions", "remedies", "search", "widgets")
+        names = ("algorithm", "api", "cheat_sheet", "commands", "course", "documents", "equations", "exercises")
+        names += ("notebooks", "questions", "remedies", "search", "widgets")
         return SimpleNamespace(**{name: import_module(f"builder.{name}") for name in names})
     finally:
         sys.path.remove(str(DOCS))

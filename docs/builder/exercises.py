@@ -1,0 +1,259 @@
+"""The answers to exercises of the course and to their usual mistakes: computed here, recorded for ``vf.check``.
+
+``python docs/builder/exercises.py`` writes the record; a test computes it again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import verification as vf
+from ndtheory import energy_norms
+from ndtheory.moduli import Moduli, half_planes
+from verification.algorithm.rates import StepRatio
+from verification.bounds.verdicts import judge
+
+RECORD = Path(__file__).resolve().parents[2] / "verification" / "data" / "exercises.json"
+
+Numbers = Sequence[Any]
+
+#: Mistakes in an answer that any exercise may have.
+ANSWER: dict[str, Callable[[float], float]] = {
+    "Is the quotient upside down?": lambda x: 1 / x,
+    "Did you exchange theta and 1 - theta?": lambda x: 1 - x,
+    "Is this 1 + lambda in place of lambda?": lambda x: 1 + x,
+    "Is the sign right?": lambda x: -x,
+    "Is a factor 2 missing?": lambda x: x / 2,
+    "Is there a factor 2 too many?": lambda x: 2 * x,
+    "Is a root still to be taken?": lambda x: x**2,
+    "Is this in degrees? Take radians.": math.degrees,
+}
+
+# Mistakes in what an answer is computed from.
+OTHER_BODY = "Did you take the other body?"
+SQUARE = "Did you forget a square?"
+ROOT = "Did you forget a root?"
+OPEN = "Is the 1 of 1 + rho there? It stands for open nodes."
+TIED = "Does this serve open nodes too?"
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """An exercise: what it asks, the answer as a function of some numbers, and mistakes as functions of the same."""
+
+    asks: str
+    answer: Callable[..., Numbers]
+    given: Callable[[], Numbers]
+    mistakes: dict[str, Callable[..., Numbers]] = field(default_factory=dict)
+
+    def wrong(self, numbers: Numbers, right: Numbers) -> Iterator[tuple[str, list[Any]]]:
+        """What each mistake leads to."""
+        for hint, mistake in self.mistakes.items():
+            yield hint, list(mistake(*numbers))
+        for hint, change in ANSWER.items() if all(isinstance(x, int | float) for x in right) else ():
+            with suppress(ArithmeticError):
+                yield hint, [change(x) for x in right]
+
+    def record(self) -> dict[str, Any]:
+        """The answer, and what each mistake leads to; what the exercise says of a mistake counts first."""
+        numbers = self.given()
+        right = list(self.answer(*numbers))
+        wrong: dict[str, list[Any]] = {}
+        for hint, found in self.wrong(numbers, right):
+            wrong.setdefault(hint, found)
+        return {"asks": self.asks, "right": right, "wrong": wrong}
+
+
+def measured(name: str, key: str, *bodies: int, **changes: Any) -> list[float]:
+    """A constant of a built-in problem, for each body as the Neumann body."""
+    problem = vf.example(name).changed(**changes)
+    return [getattr(vf.measure(problem.changed(neumann_body=body)), key).value for body in bodies]
+
+
+def bonded(**changes: Any) -> tuple[float, float]:
+    """The ends of the spectrum of the plates of ``spectrum``."""
+    found = vf.measure(vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.2", friction=0, **changes))
+    return found.rho_min.value, found.rho_max.value
+
+
+def steps(rho: float) -> int:
+    """Steps to 1e-9 that the best theta promises."""
+    return math.ceil(math.log(1e-9) / math.log(energy_norms.predicted_rate(rho)))
+
+
+def thetas(rho: float) -> Numbers:
+    """What the exercise on two bars asks."""
+    return rho, 1 / (1 + rho), energy_norms.predicted_theta(rho), 2 / (1 + rho)
+
+
+def last_theta() -> tuple[float, float]:
+    """The numbers of the last theta: rho and kappa_1 at the largest friction."""
+    found = vf.measure(vf.example("section6").changed(cells=((20, 3), (12, 3))))
+    edge = found.with_friction(found.friction_limit.value * (1 - 1e-6))
+    return edge.rho_max.value, edge.kappa_1.value
+
+
+def verdicts(error: float, *ratios: float) -> list[str]:
+    """The verdicts on a bound of 0.5, for ratios known to within an error."""
+    seen = (StepRatio(value=x, lo=x - error, hi=x + error, steps=9) for x in ratios)
+    return [judge(0.5, ratio, "").verdict for ratio in seen]
+
+
+def readings(theta: float, ratio: float) -> list[float]:
+    """The smallest rho of each reading of a run."""
+    found = {reading.kind: reading.lo for reading in vf.advise_run(theta, ratio).readings}
+    return [found["mode-high"], found["mode-low"]]
+
+
+def cost(rho: float) -> float:
+    """How many times as many steps 1/(1 + rho) takes as 2/(2 + rho)."""
+    return math.log(energy_norms.predicted_rate(rho)) / math.log(rho / (1 + rho))
+
+
+def limit(nu: float) -> float:
+    """The half-plane limit with a Poisson's ratio of the Neumann body."""
+    upper, lower = Moduli(young=20000, poisson="0.3"), Moduli(young=70000, poisson=str(nu))
+    return float(half_planes(upper, lower).high)
+
+
+def ends_of(t1: float, q1: float, t2: float, q2: float, less: float = 1) -> Numbers:
+    """Both ends of a spectrum, and the best theta, from two logs."""
+    low, high = (1 - q1) / t1, (1 + q2) / t2
+    return low - less, high - less, 2 / (low + high)
+
+
+EXERCISES = {
+    "two_bars.1": Exercise(
+        "both ends of the interval of g", lambda rho: (0.1, 0.1 * (1 + 1 / rho)),
+        lambda: measured("two-bars", "rho_max", 2),
+        {"Is it divided by theta in place of 1 - theta?": lambda rho: (0.1, 0.1 * (1 + rho)),
+         "Is it the force of the other bar?": lambda rho: (0.1 * rho, 0.1 * (1 + rho))},
+    ),
+    "two_bars.2": Exercise(
+        "rho, 1/(1+rho), 2/(2+rho) and the limit of theta", thetas, lambda: measured("two-bars", "rho_max", 1),
+        {OTHER_BODY: lambda rho: thetas(1 / rho), OPEN: lambda rho: (rho, 1 / rho, 1 / (1 + rho), 2 / rho)},
+    ),
+    "two_bars.3": Exercise(
+        "m for E = L = 1", lambda t: [1 / (1 + 1 / t**2)], lambda: [math.pi / 2],
+        {SQUARE: lambda t: [1 / (1 + 1 / t)], "Is the frequency upside down?": lambda t: [1 / (1 + t**2)],
+         "This is the ratio t of the integrals. What is m with it?": lambda t: [t**2]},
+    ),
+    "open_or_closed.2": Exercise(
+        "the ratio of the steps for rho = 1, and its limit for large rho", lambda *rho: [cost(x) for x in rho],
+        lambda: [1, 1e8],
+        {"Is it a ratio of the factors? The steps are in the ratio of their logarithms.": lambda *rho:
+         [(x / (1 + x)) / energy_norms.predicted_rate(x) for x in rho]},
+    ),
+    "open_or_closed.3": Exercise(
+        "both theta for rho = 3", lambda rho: (1 / (1 + rho), 2 / (1 + rho)), lambda: [3],
+        {OPEN: lambda rho: (1 / rho, 2 / rho),
+         "Is that the theta of the best rate? It has the largest fall.": lambda rho: [2 / (2 + rho)] * 2},
+    ),
+    "spectrum.1": Exercise(
+        "how many times as many steps with the lower plate as Neumann body, and with the upper one",
+        lambda low, high: [
+            math.log(energy_norms.tied_rate(a, b)) / math.log(energy_norms.predicted_rate(b))
+            for a, b in ((low, high), (1 / high, 1 / low))
+        ],
+        bonded,
+        {"Is it a ratio of the factors? The steps are in the ratio of their logarithms.": lambda low, high: [
+            energy_norms.predicted_rate(b) / energy_norms.tied_rate(a, b) for a, b in ((low, high), (1 / high, 1 / low))
+        ]},
+    ),
+    "spectrum.2": Exercise(
+        "the largest eigenvalue, the bonded optimum and the contact optimum of case (b)",
+        lambda low, high: (high, energy_norms.tied_theta(low, high), energy_norms.predicted_theta(high)),
+        lambda: bonded(young=(700000, 20000)),
+        {"Did you change the modulus of the contact body?": lambda low, high: (
+            100 * high, energy_norms.tied_theta(100 * low, 100 * high), energy_norms.predicted_theta(100 * high)),
+         "Is this case (a)?": lambda low, high: (
+            10 * high, energy_norms.tied_theta(10 * low, 10 * high), energy_norms.predicted_theta(10 * high))},
+    ),
+    "spectrum.3": Exercise(
+        "nu_n, and the limit there over the limit for nu_n = 0", lambda nu: (nu, limit(nu) / limit(0)), lambda: [0.5],
+        {"Does G_n depend on nu_n too?": lambda nu: (nu, (3 - 4 * nu) / 3)},
+    ),
+    "which_side.1": Exercise(
+        "E1/E2", lambda lower, upper: [math.sqrt(lower / upper)],
+        lambda: measured("section6", "rho_max", 1, 2, cells=((20, 3), (12, 3)), young=(20000, 20000)),
+        {OTHER_BODY: lambda lower, upper: [math.sqrt(upper / lower)], ROOT: lambda lower, upper: [lower / upper]},
+    ),
+    "which_side.2": Exercise(
+        "the least rho for the mode of the largest eigenvalue, and for the smallest", readings, lambda: [0.5, 0.45],
+        {"Is the ratio divided by theta before 1 is added?": lambda theta, q: (q / theta, (1 - q / theta) - 1)},
+    ),
+    "which_side.3": Exercise(
+        "the promised steps with the lower body as Neumann body, and with the upper one",
+        lambda *rho: [*map(steps, rho)],
+        lambda: measured("section6", "rho_normal", 1, 2, cells=((20, 3), (12, 3)), friction=0),
+        {OTHER_BODY: lambda *rho: [steps(x) for x in reversed(rho)],
+         "Is this 1/(1 + rho)? The promise is made for 2/(2 + rho).":
+         lambda *rho: [math.ceil(math.log(1e-9) / math.log(x / (1 + x))) for x in rho]},
+    ),
+    "constants.1": Exercise(
+        "the length", lambda full: [full / 2], lambda: [math.pi],
+        {"Is this where m = E / 3? Half of E needs mu = 1.": lambda full: [full / math.sqrt(2)]},
+    ),
+    "constants.2": Exercise(
+        "C_R for the length 10", lambda x: [math.sqrt((x / 3 + 1 / x) * math.tanh(x))], lambda: [10],
+        {"Is this the short bar? C_R grows with the length.": lambda x: [1.0],
+         "Where is the term 1/l?": lambda x: [math.sqrt(x / 3)]},
+    ),
+    "constants.3": Exercise(
+        "the length under [norm]", lambda mm: [1 / mm], lambda: [0.001],
+        {"Is it the other way round? One millimetre is how many micrometres?": lambda mm: [mm],
+         "Square millimetres? A length is asked for.": lambda mm: [1 / mm**2]},
+    ),
+    "friction.1": Exercise(
+        "k_s and k_e",
+        lambda rho, a, b: (energy_norms.friction_multiple(a, b), energy_norms.friction_limit(rho, a, b)),
+        lambda: (1.0, math.sqrt(2), 1.0),
+        {ROOT: lambda rho, a, b: (
+            energy_norms.friction_multiple(a**2, b**2), energy_norms.friction_limit(rho, a**2, b**2)),
+         "Did you exchange the bodies of C_t1 and C_t2?":
+         lambda rho, a, b: (energy_norms.friction_multiple(b, a), energy_norms.friction_limit(rho, b, a))},
+    ),
+    "friction.2": Exercise(
+        "the k from which there are three", lambda slip: [(3 * slip - 1) / (slip - 3)], lambda: [12],
+        {"This is necessary only. Does the slip have the right direction?": lambda slip: [3.0],
+         "This is k_e, below which there is one solution.": lambda slip: [
+             energy_norms.friction_limit(1.0, math.sqrt(2), 1.0)]},
+    ),
+    "theorem_and_experiment.2": Exercise(
+        "the three verdicts", lambda *ratios: verdicts(0.01, *ratios), lambda: (0.52, 0.48, 0.501),
+        {"Does the ratio exceed the bound by more than its own error?": lambda *ratios: verdicts(0, *ratios)},
+    ),
+    "theorem_and_experiment.3": Exercise(
+        "theta at k_e", lambda rho, a: [(2 - a * math.sqrt(rho)) / (2 + rho - a * math.sqrt(rho))], last_theta,
+        {"Did you forget the root of rho?": lambda rho, a: [(2 - a * rho) / (2 + rho - a * rho)],
+         "This is the best theta without friction.": lambda rho, a: [2 / (2 + rho)]},
+    ),
+    "other_code.1": Exercise(
+        "the smallest and the largest eigenvalue, and the best theta", ends_of, lambda: (0.1, 0.85, 0.22, 0.76),
+        {"Is this 1 + lambda in place of lambda?": lambda *logs: ends_of(*logs, less=0),
+         "Does the other reading of each log fit the other log?":
+         lambda t1, q1, t2, q2: ((1 - q2) / t2 - 1, (1 + q1) / t1 - 1, 2 / ((1 - q2) / t2 + (1 + q1) / t1)),
+         "Did you forget the 1 of 1 + lambda in theta?":
+         lambda *logs: (*ends_of(*logs)[:2], 2 / sum(ends_of(*logs)[:2]))},
+    ),
+}  # fmt: skip
+
+
+def text() -> str:
+    """The record as it is in its file; numbers to nine digits, which all machines share."""
+    short = lambda x: float(f"{x:.9g}") if isinstance(x, float) else x
+    found = {name: exercise.record() for name, exercise in EXERCISES.items()}
+    for record in found.values():
+        record["right"] = [*map(short, record["right"])]
+        record["wrong"] = {hint: [*map(short, numbers)] for hint, numbers in record["wrong"].items()}
+    return "{\n" + ",\n".join(f"{json.dumps(name)}: {json.dumps(found[name])}" for name in found) + "\n}\n"
+
+
+if __name__ == "__main__":
+    RECORD.write_text(text(), encoding="utf-8")

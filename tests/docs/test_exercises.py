@@ -1,0 +1,109 @@
+"""``vf.check``: the record is what the library computes, and each page says which answers can be checked."""
+
+import json
+import math
+import re
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import verification as vf
+
+DOCS = Path(__file__).parents[2] / "docs"
+KNOWN = json.loads((files("verification") / "data" / "exercises.json").read_text("utf-8"))
+
+
+def answer_to(name):
+    return right[0] if len(right := KNOWN[name]["right"]) == 1 else right
+
+
+def agree(one, other):
+    if isinstance(one, str):
+        return one == other
+    return math.isclose(one, other, rel_tol=1e-6)
+
+
+def test_the_record_is_what_the_library_computes_now(builder):
+    made = json.loads(builder.exercises.text())
+    assert len(made) >= 12
+    assert list(made) == list(KNOWN), "python docs/builder/exercises.py"
+    for name, record in made.items():
+        old = KNOWN[name]
+        assert (record["asks"], list(record["wrong"])) == (old["asks"], list(old["wrong"]))
+        for ours, theirs in [
+            (record["right"], old["right"]),
+            *((record["wrong"][x], old["wrong"][x]) for x in old["wrong"]),
+        ]:
+            assert all(map(agree, ours, theirs)), name
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_the_answer_is_right_and_a_usual_mistake_gets_its_hint(name):
+    assert vf.check(name, answer_to(name)) == "right"
+    right, hints = KNOWN[name]["right"], set()
+    for numbers in KNOWN[name]["wrong"].values():
+        said = vf.check(name, numbers)
+        if said != "right":
+            start, _, hint = said.partition(". ")
+            assert start == "Not yet" if len(right) == 1 else re.fullmatch(r"Not yet, number \d", start)
+            assert hint in KNOWN[name]["wrong"]
+            hints.add(hint)
+    assert hints
+    if not isinstance(right[0], str):
+        assert vf.check(name, [1.0173 * 7.3 * abs(x) + 11 for x in right]).startswith("Not yet")
+
+
+def test_an_answer_may_be_fractions_an_array_or_rounded_to_three_digits():
+    assert vf.check("two_bars.2", ("1/3", "3/4", "6/7", "3/2")) == "right"
+    assert vf.check("two_bars.2", np.array([0.333, 0.75, 0.857, 1.5])) == "right"
+    assert vf.check("two_bars.2", [0.33, 0.75, 0.857, 1.5]) == "Not yet, number 1."
+    assert vf.check("theorem_and_experiment.2", ["violated", "consistent", "INCONCLUSIVE"]) == "right"
+
+
+def test_the_hints_fit_the_mistakes_that_they_are_for():
+    t = 2 / math.pi
+    assert vf.check("two_bars.3", 1 / (1 + t)) == "Not yet. Did you forget a square?"
+    assert vf.check("two_bars.2", [3, 1 / 4, 2 / 5, 1 / 2]) == "Not yet, number 1. Did you take the other body?"
+    assert vf.check("constants.1", 90) == "Not yet. Is this in degrees? Take radians."
+    assert vf.check("two_bars.2", [1 / 3, 1 / 4, 6 / 7, 3 / 2]) == "Not yet, number 2. Did you take the other body?"
+    assert vf.check("open_or_closed.3", [3 / 4, 1 / 2]) == "Not yet, number 1. Did you exchange theta and 1 - theta?"
+    assert vf.check("two_bars.3", 123.4) == "Not yet."
+
+
+@pytest.mark.parametrize(
+    ("name", "answer", "said"),
+    [
+        ("two_bars.4", 1, r"no exercise 'two_bars\.4'; there are two_bars\.1, .*other_code\.1; did you mean"),
+        ("two_bars.2", 1, r"two_bars\.2: needed rho, .*, 4 in all; received 1"),
+        ("two_bars.3", "a third", "'a third' is not a number"),
+        ("two_bars.3", float("nan"), "'nan' is not a finite number"),
+    ],
+)
+def test_what_is_no_answer_is_refused_in_one_line(name, answer, said):
+    with pytest.raises(ValueError, match=said) as refused:
+        vf.check(name, answer)
+    assert "\n" not in str(refused.value)
+
+
+EXERCISE = re.compile(r"\{admonition\} Exercise (\d):.*?\{dropdown\} Solution", re.DOTALL)
+
+
+def line(name):
+    return f'*Check:* `vf.check("{name}", {"[..]" if len(KNOWN[name]["right"]) > 1 else ".."})` takes'
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_the_page_says_below_the_exercise_how_to_check_it_and_its_own_numbers_are_right(name):
+    page, number = name.split(".")
+    text = (DOCS / "examples" / f"{page}.md").read_text("utf-8")
+    (exercise,) = (found[0] for found in EXERCISE.finditer(text) if found[1] == number)
+    assert f"{line(name)} {KNOWN[name]['asks']}.\n" in exercise
+    assert f'assert vf.check("{name}", ' in text
+
+
+def test_every_line_on_a_page_belongs_to_an_exercise_of_the_record():
+    pages = [path.read_text("utf-8") for path in [*DOCS.glob("*.md"), *(DOCS / "examples").glob("*.md")]]
+    named = {name for text in pages for name in re.findall(r'vf\.check\("([\w.]+)"', text)}
+    assert named == set(KNOWN)
