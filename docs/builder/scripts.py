@@ -13,6 +13,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx_gallery.scrapers import figure_rst
 
+from builder import notebooks
 from verification.figures import style
 
 #: The folders of scripts in the order of the page.
@@ -41,7 +42,7 @@ SETTINGS = {
     "reset_modules": ("builder.scripts.dress",),
     "reset_modules_order": "both",
     "capture_repr": (),  # what a script prints is shown, what a line evaluates to is not
-    "first_notebook_cell": "%matplotlib inline",
+    "first_notebook_cell": notebooks.FIRST.strip(),
     "last_notebook_cell": "figure",
     "write_computation_times": False,  # and no times on pages: the same sources give the same site
     "min_reported_time": 1e9,
@@ -76,14 +77,14 @@ def take_figure(block: Any, variables: dict[str, Any], settings: Mapping[str, An
     Raises
     ------
     ValueError
-        No figure of that name, or another number of pictures than one.
+        The script has saved no picture of its name.
     """
     if block[0] != "code":
         return ""
     script = Path(variables["src_file"])
     saved = script.with_suffix(".png")
-    if list(script.parent.glob("*.png")) != [saved]:
-        raise ValueError(f"{script}: needed the one picture figure.savefig({saved.name!r})")
+    if not saved.exists():
+        raise ValueError(f"{script}: no picture; needed figure.savefig({saved.name!r})")
     target = next(variables["image_path_iterator"])
     saved.replace(target)
     title = (ast.get_docstring(ast.parse(script.read_text("utf-8"))) or "").partition("\n")[0]
