@@ -37,7 +37,7 @@ def _zones(result: Result, ax: Any) -> None:
     mark_states(ax, contact.status, x, contact.pressure)
     for _, end in ZONES[:-1]:
         ax.axvline(end, color="0.5", linestyle=":", label="printed ends of zones" if end == ZONES[0][1] else None)
-    ax.set(xlabel="x from the left end of Gamma_c (mm)", ylabel="pressure (MPa)")
+    ax.set(xlabel=r"x from the left end of $\Gamma_c$ (mm)", ylabel="pressure (MPa)")
     legend_beside(ax)
 
 

@@ -40,6 +40,9 @@ OUTCOMES = {
 #: The axis of theta.
 THETA = "relaxation factor theta"
 
+#: The norm (5.21) of a force, as mathematics.
+NORM = r"$|\!|\!|{}|\!|\!|$".format
+
 #: Digits of an exponent.
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

@@ -11,7 +11,13 @@ from matplotlib.figure import Figure
 from ndtheory.statements import statements
 from verification.bounds.losses import Loss, Losses
 from verification.bounds.table import Printed, Repaired
-from verification.figures.style import STATES, new_figure, styled
+from verification.figures.style import NORM, STATES, new_figure, styled
+
+#: The change of T in the energy norm.
+CHANGE = NORM(r"T\psi-T\tilde\psi")
+
+#: The inequalities between squares of norms.
+SQUARED = ("(5.29)", "(5.38)")
 
 
 def draw_waterfall(losses: Losses, unit: str) -> Figure:
@@ -25,7 +31,7 @@ def draw_waterfall(losses: Losses, unit: str) -> Figure:
             f"from the largest friction term found to its bound (5.30), repaired, then printed in {unit}",
             losses.friction,
         ),
-        ("from the largest |||T psi - T psi~||| found to its bound (5.38)", losses.lipschitz),
+        ("from the largest CHANGE found to its bound (5.38)", losses.lipschitz),
     ]
     chains = [(title, chain) for title, chain in chains if chain]
     with styled():
@@ -45,6 +51,8 @@ def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None
         end = begin + loss.decades
         farthest = max(farthest, end)
         says = f" {loss.decades:.1f}" + (", only the unit" if loss.only_unit else "")
+        if loss.label in SQUARED:
+            says += f" = 2 × {loss.decades / 2:.1f} (squared)"
         ax.text(max(begin, end), i, says, va="center")
         begin = end if adds_up else 0.0
     labels = [_in_words(loss.label) for loss in chain]
@@ -55,10 +63,10 @@ def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None
     ax.set_yticks(range(len(labels)), labels)
     ax.invert_yaxis()
     ax.set_xlim(right=1.12 * farthest)
-    ax.set(xlabel="powers of ten lost", title=fill(title, 64))
+    ax.set(xlabel="powers of ten lost", title=fill(title, 64).replace("CHANGE", CHANGE))
 
 
 def _in_words(label: str) -> str:
     """The label of an inequality with the title of its statement, if it is one of the paper's."""
     statement = statements().get(label.strip("()"))
-    return label if statement is None else f"{statement.title} {label}"
+    return label.replace("m~", r"$\tilde m$") if statement is None else f"{statement.title} {label}"

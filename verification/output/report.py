@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from html import escape
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -52,6 +53,17 @@ def _wide(part: Table) -> bool:
     return len(part.head) > 3 or any(len(str(cell)) > NARROW for row in part.rows for cell in row)
 
 
+class _Raised(str):
+    """HTML of a text with its powers raised and the index of Gamma_c lowered, which jinja2 takes as it is."""
+
+    def __new__(cls, text: object) -> _Raised:
+        powers = re.sub(r"\^(-?\d+(?:\.\d+)?)", r"<sup>\1</sup>", escape(str(text)))
+        return super().__new__(cls, powers.replace("Gamma_c", "Γ<sub>c</sub>"))
+
+    def __html__(self) -> str:
+        return self
+
+
 def _inline(name: str, svg: str) -> str:
     """An SVG without its prologue, its ids made unique, so that a page can contain several."""
     svg = re.sub(r"^.*?(?=<svg)", "", svg, flags=re.DOTALL)
@@ -66,6 +78,7 @@ def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
         loader=PackageLoader("verification", "data"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.tests["wide"] = _wide
+    environment.filters["raised"] = _Raised
     setting, *sections = shown(comparison.sections(), "report")
     return environment.get_template("report.html.j2").render(
         title=printable(comparison.run.pair.title),

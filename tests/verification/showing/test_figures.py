@@ -1,5 +1,6 @@
 """Figures: the same file every time, axes with units, nothing taken from the user's settings."""
 
+import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -7,10 +8,12 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
+from matplotlib.text import Text
 from readable import contrast, grey
 from strategies import AT_NIGHT
 
 import verification as vf
+from verification import figures
 from verification.algorithm.loop import Outcome
 from verification.bounds.bound import Region
 from verification.cli.problems import examples
@@ -30,6 +33,30 @@ def problems(tmp_path_factory):
         text = text.replace("cells = [40, 6]", "cells = [15, 3]").replace("cells = [24, 6]", "cells = [9, 3]")
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
     return {name: vf.load(folder / f"{name}.toml") for name in examples()}
+
+
+def test_the_waterfall_says_which_bars_are_squared_and_what_they_are_without_the_square(comparisons):
+    found = comparisons["inside"].losses
+    alone, _, chain = (
+        [text.get_text().strip() for text in ax.texts] for ax in figures.draw_waterfall(found, "MPa").axes
+    )
+    squared = {loss.label: says for loss, says in zip(found.links, alone, strict=True) if "squared" in says}
+    assert set(squared) == {"(5.29)", "(5.38)"}
+    assert squared["(5.38)"].split("\N{MULTIPLICATION SIGN} ")[1] == f"{chain[-1]} (squared)"
+
+
+#: What stands for mathematics where none is set.
+TYPED = re.compile(r"Gamma_c|\|\|\||~")
+
+
+def test_no_figure_has_mathematics_as_it_is_typed_in_a_program(comparisons):
+    for comparison in comparisons.values():
+        drawn = [draw_bodies(comparison.run, motions=True), draw_residuals(comparison.run, comparison.computed)]
+        if comparison.losses:
+            drawn.append(figures.draw_waterfall(comparison.losses, "MPa"))
+        for figure in drawn:
+            texts = [text.get_text() for text in figure.findobj(Text)]
+            assert [text for text in texts if TYPED.search(re.sub(r"\$.*?\$", "", text))] == []
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +114,7 @@ def test_residuals_are_drawn_on_a_logarithmic_axis_that_says_what_it_shows(runs,
     assert axes.get_yscale() == "log"
     assert (axes.get_xlabel(), axes.get_ylabel()) == (
         "evaluations of T",
-        "residual |||T g - g|||, relative to the forces",
+        r"residual $|\!|\!|T g - g|\!|\!|$, relative to the forces",
     )
     x, y = axes.lines[0].get_data()
     shown = [(i, r) for i, r in enumerate(run.history) if r > 0]

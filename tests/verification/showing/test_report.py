@@ -68,8 +68,11 @@ class Reader(HTMLParser):
 
 
 def read(folder: Path) -> Reader:
-    reader = Reader()
-    reader.feed((folder / "report.html").read_text("utf-8"))
+    """A report, its powers and indices as on the screen."""
+    reader, page = Reader(), (folder / "report.html").read_text("utf-8")
+    for tag, typed in (("sup", "^"), ("sub", "_")):
+        page = re.sub(rf"<{tag}>(.*?)</{tag}>", rf"{typed}\1", page)
+    reader.feed(page)
     return reader
 
 
@@ -105,12 +108,19 @@ def screen(comparison) -> str:
 
 
 def test_the_report_has_the_words_and_the_digits_of_the_screen(comparison, written):
-    page, shown = read(written), screen(comparison)
+    page, shown = read(written), screen(comparison).replace("Gamma_c", "Γ_c")
     missing = set(shown.lower().split()) - set(page.text.lower().split())
     assert missing <= {"|"}  # between the title and what follows
     cells = "\n".join(page.cells)
     assert "consistent" in cells
     assert set(cells.split()) <= set(shown.split())
+
+
+def test_powers_are_raised_and_no_text_of_the_page_is_typed_as_in_a_program(written):
+    page = re.sub("<!--.*?-->", "", (written / "report.html").read_text("utf-8"))  # the texts of the figures, as typed
+    assert "10<sup>" in page
+    assert "Γ<sub>c</sub>" in page
+    assert re.findall(r"\d\^|Gamma_|\|\|\|", page) == []
 
 
 def test_every_table_and_figure_of_the_report_has_a_caption(written):
