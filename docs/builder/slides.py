@@ -11,6 +11,7 @@ from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxRole
 from sphinx.util.osutil import relative_uri
 from sphinx_design.dropdown import dropdown_main
@@ -25,6 +26,7 @@ SHOWN = (nodes.math_block, nodes.table, nodes.enumerated_list, theorem_node)
 MARK, NONE = "slide", "no slide"
 
 SENTENCE = re.compile(r"[.?!](?=\s|$)|:$")
+LINES = 22  # of a listing on one slide: more would have letters too small for the back of a hall
 LONGEST = 240  # characters of the first sentences, where there is more than one
 
 
@@ -56,8 +58,18 @@ class SlidesRole(SphinxRole):
             if name not in self.env.found_docs:
                 raise ValueError(f"{self.env.docname}, line {self.lineno}: no page {name!r} for slides")
         self.env.metadata[self.env.docname].setdefault("slides", []).append(pages)
-        link = self.env.app.builder.get_relative_uri(self.env.docname, deck(pages[0]))
-        return [nodes.reference("", "slides", internal=True, refuri=link)], []
+        return [slide_link(pages=pages, target="")], []
+
+
+class slide_link(nodes.General, nodes.Element):
+    """A link to a deck and the number of its slides, or to its slide with a target, once all pages are read."""
+
+
+class SlideRole(SphinxRole):
+    """``{slide}`cobweb```: the number of the slide that has this widget, or this label of a figure or theorem."""
+
+    def run(self) -> tuple[list[nodes.Node], list[nodes.system_message]]:
+        return [slide_link(pages=None, target=self.text)], []
 
 
 def deck(page: str) -> str:
@@ -81,11 +93,12 @@ def opening(paragraph: nodes.Node) -> nodes.paragraph:
 def blocks(section: nodes.Element) -> Iterator[nodes.Node]:
     """The parts of a section, the outputs of its cells among them, without sections below it."""
     for child in section.children:
-        if isinstance(child, nodes.container) and "cell" in child["classes"]:
+        classes = child.get("classes", ()) if isinstance(child, nodes.container) else ()
+        if "cell" in classes:
             for part in child.children:
                 if "cell_output" in part["classes"]:
                     yield from part.children
-        elif isinstance(child, nodes.container) and "table-wrapper" in child["classes"]:  # of the theme
+        elif any(name.endswith("-wrapper") for name in classes):  # in which a theme puts a table or a formula
             yield from child.children
         elif not isinstance(child, nodes.section | nodes.title):
             yield child
@@ -102,6 +115,15 @@ def exercise(block: nodes.Node) -> Slide | None:
         return None
     title, *body = block.children
     return Slide(title=title.children, anchor="", blocks=[part for part in body if not isinstance(part, dropdown_main)])
+
+
+def in_parts(block: nodes.Node) -> list[nodes.Node]:
+    """A listing in parts that fit a slide; any other block as it is."""
+    lines = block.astext().splitlines() if isinstance(block, nodes.literal_block) else []
+    if len(lines) <= LINES:
+        return [block]
+    parts = ["\n".join(lines[begin : begin + LINES]) for begin in range(0, len(lines), LINES)]
+    return [nodes.literal_block(text, text, **block.attributes) for text in parts]
 
 
 def cut(page: nodes.document) -> Iterator[Slide]:
@@ -133,11 +155,55 @@ def cut(page: nodes.document) -> Iterator[Slide]:
                 first.blocks.append((marked or shown)[0])
             elif pictures and not is_widget(pictures[0]):
                 first.blocks.append(pictures.pop(0))
+            *kept, last = first.blocks
+            last, *rest = in_parts(last)
+            first.blocks = [*kept, last]
             yield first
+            yield from (Slide(title=title, anchor=anchor, blocks=[part]) for part in rest)
         yield from (Slide(title=title, anchor=anchor, blocks=[picture]) for picture in pictures)
         for slide in filter(None, map(exercise, found)):
             slide.anchor = anchor
             yield slide
+
+
+def found_on(slide: Slide, target: str) -> bool:
+    """True if a slide has a widget of that name, or what has that label."""
+    for block in slide.blocks:
+        if is_widget(block) and f'data-widget="{target}"' in block.astext():
+            return True
+        if any(target.lower() in node["ids"] for node in block.findall(nodes.Element)):
+            return True
+    return False
+
+
+def number_slides(app: Sphinx, doctree: nodes.document, page: str) -> None:
+    """Put the number of its slide, and of the slides of a deck, into each link to one.
+
+    Raises
+    ------
+    ExtensionError
+        A target that is on no slide.
+    """
+    places = list(doctree.findall(slide_link))
+    resolved = lambda name: app.env.get_and_resolve_doctree(name, app.builder)
+    decks = {
+        deck(pages[0]): [slide for name in pages for slide in cut(resolved(name))]
+        for pages in (app.env.metadata[page].get("slides", ()) if places else ())
+    }
+    for place in places:
+        target = place["target"]
+        if place["pages"]:
+            name, words, anchor = deck(place["pages"][0]), f"{len(decks[deck(place['pages'][0])])} slides", ""
+        else:
+            numbers = [
+                (name, n) for name, slides in decks.items() for n, one in enumerate(slides, 1) if found_on(one, target)
+            ]
+            if not numbers:
+                raise ExtensionError(f"{page}: no slide has {target!r}: needed a widget or a label on a page of a deck")
+            name, number = numbers[0]
+            words, anchor = f"slide {number}", f"#{number}"
+        link = f"{app.builder.get_relative_uri(page, name)}{anchor}"
+        place.replace_self(nodes.reference("", words, internal=True, refuri=link))
 
 
 class Decks:
@@ -201,6 +267,15 @@ class Decks:
         path = self.builder.get_outfilename(name)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
+
+
+def connect(app: Sphinx) -> None:
+    """Roles and events of the decks."""
+    app.add_role("slides", SlidesRole())
+    app.add_role("slide", SlideRole())
+    app.add_node(slide_link)
+    app.connect("doctree-resolved", number_slides)
+    app.connect("html-collect-pages", write_decks)
 
 
 STYLES = ("pygments.css", "widgets.css", "map.css", "deck.css")

@@ -20,10 +20,12 @@
 
   // The text of each slide, smaller where it would leave the slide.
   function fit() {
+    const least = parseFloat(getComputedStyle(document.querySelector("footer")).fontSize);
+    for (const map of document.querySelectorAll("svg.map")) map.style.zoom = single() ? least / 10 : 1; // 10: its smallest letters
     for (const slide of slides) {
       const inner = slide.firstElementChild;
       inner.style.fontSize = "";
-      for (let size = 1; single() && size > 0.5; size -= 0.04) {
+      for (let size = 1; single() && size >= 0.72; size -= 0.04) {
         inner.style.fontSize = `${size}em`;
         if (inner.scrollHeight <= slide.clientHeight - 2 * inner.offsetTop && inner.scrollWidth <= inner.clientWidth) break;
       }

@@ -22,7 +22,7 @@ nd.onPage("plane", (figure) => {
   const zoom = nd.button(widget, "zoom", "zoom in, linear", () => {});
   const X = { low: LEAST, high: 1, log: true, name: "theta" };
   const Y = { low: LOW, high: HIGH, log: true, name: "friction k" };
-  const chart = new nd.Chart({ width: 440, height: 300, label: "Where each form of the theorem proves contraction", x: X, y: Y });
+  const chart = new nd.Chart({ ...(figure.closest(".slide") ? {} : { width: 440, height: 300 }), label: "Where each form of the theorem proves contraction", x: X, y: Y });
   widget.pictures.append(chart.root, nd.html("p", { class: "legend" }, "Green: in energy norms. Blue: repaired. Dashed red: printed (dotted: in MPa)."));
 
   // The constants at a ratio of the moduli and a unit of stress (MPa).

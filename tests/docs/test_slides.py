@@ -19,9 +19,12 @@ from processes import sites
 DOCS = Path(__file__).parents[2] / "docs"
 
 #: At least so many slides in each deck: a title, the sections, three exercises.
-FEWEST = 9
+FEWEST = 10
 
 SLIDE = re.compile(r'<section class="slide">.*?</section>', re.DOTALL)
+#: How a displayed formula begins.
+FORMULA = r"\["
+
 WIDGET = re.compile(r'data-widget="(\w+)"')
 
 
@@ -60,6 +63,8 @@ def faults(site: Path, lectures: int) -> list[str]:
             if not (deck.parent / file).exists():
                 found.append(f"{deck.name}: {file} is missing")
         shown = {name for page in pages_of(deck) for name in WIDGET.findall(page.read_text("utf-8"))}
+        if any(FORMULA in page.read_text("utf-8") for page in pages_of(deck)) > (FORMULA in text):
+            found.append(f"{deck.name}: its pages have displayed formulas, and no slide has one")
         if shown != set(WIDGET.findall(text)):
             found.append(f"{deck.name}: needed the widgets {sorted(shown)}")
         found += [f"{deck.name}: no script of {name}" for name in shown if f'/{script(name)}.js"' not in text]
@@ -79,8 +84,25 @@ return [...new Set([...before, ...beyond()])];
 """
 
 
-def overflowing(decks: list[Path]) -> list[str]:
-    """Lines ``deck: slide`` for all slides that leave a window of 1280 x 720 pixels."""
+#: The slides with letters below a 45th of their height: 24 pixels on a projector of 1920 x 1080.
+SMALL = """
+return [...document.querySelectorAll(".slide")].flatMap((slide, i) => {
+  const walk = document.createTreeWalker(slide, NodeFilter.SHOW_TEXT), sizes = [];
+  while (walk.nextNode()) {
+    const parent = walk.currentNode.parentElement, range = document.createRange();
+    range.selectNode(walk.currentNode);
+    if (!walk.currentNode.textContent.trim() || parent.closest("noscript, mjx-container")) continue;
+    if (!range.getBoundingClientRect().width) continue;
+    const drawn = parent.closest("svg") ? parent.getScreenCTM() : { a: 1, b: 0 };
+    sizes.push(parseFloat(getComputedStyle(parent).fontSize) * Math.hypot(drawn.a, drawn.b));
+  }
+  return Math.min(...sizes) < innerHeight / 45 - 0.1 ? [i + 1] : [];
+});
+"""
+
+
+def unreadable(decks: list[Path]) -> list[str]:
+    """Lines ``deck: slide`` for slides that leave a window of 1280 x 720 pixels or have small letters."""
     from selenium.webdriver.support.ui import WebDriverWait
 
     found = []
@@ -90,6 +112,7 @@ def overflowing(decks: list[Path]) -> list[str]:
         for deck in decks:
             browser.get(deck.as_uri())
             WebDriverWait(browser, 120).until(lambda b: b.execute_script("return document.body.dataset.ready"))
+            found += [f"{deck.name}: slide {n} has small letters" for n in browser.execute_script(SMALL)]
             found += [f"{deck.name}: slide {n} overflows" for n in browser.execute_script(BEYOND)]
     return found
 
@@ -117,16 +140,25 @@ from builder.pages import WidgetDirective
 
 project, extensions = "slides", ["myst_parser", "sphinx.ext.mathjax", "sphinx_design", "sphinx_proof"]
 myst_enable_extensions, mathjax_path = ["colon_fence", "dollarmath"], "mathjax.js"
+html_theme = "furo"  # which puts formulas and tables into containers
 html_static_path = [{static!r}, {own!r}, "mathjax.js", *{widgets!r}]
 
 
 def setup(app):
     app.add_directive("widget", WidgetDirective)
-    app.add_role("slides", slides.SlidesRole())
-    app.connect("html-collect-pages", slides.write_decks)
+    slides.connect(app)
 """
 
-PLAN = "# The plan\n\n{slides}`first`, then {slides}`second`\n\n```{toctree}\nfirst\nsecond\n```\n"
+PLAN = """\
+# The plan
+
+{slides}`first`: {slide}`cobweb`, {slide}`fig-dot`; then {slides}`second`
+
+```{toctree}
+first
+second
+```
+"""
 
 FIRST = """\
 # A page about $x$
@@ -161,6 +193,13 @@ It is true.
 Then $K < 1$.
 :::
 
+## A long listing
+
+A file:
+
+```text
+SEVERAL```
+
 ## Left out
 
 % no slide
@@ -190,7 +229,9 @@ Done.
 ::::
 """
 
-SECOND = "# Too long\n\nA screen.\n\n```text\n" + "a line\n" * 90 + "```\n"
+FIRST = FIRST.replace("SEVERAL", "".join(f"line {n}\n" for n in range(30)))
+
+SECOND = "# Too long\n\nA screen.\n\n" + "1. a line\n" * 90
 
 SAID = [
     "A page about \\(x\\) It begins. A second sentence is short.",
@@ -198,6 +239,8 @@ SAID = [
     "A formula The formula is \\(y = x\\), as a picture shows. More. \\[ y = x \\]",
     "A formula [picture] A dot.",
     "A theorem It is true. Theorem (Small) Then \\(K &lt; 1\\) .",
+    f"A long listing A file: {' '.join(f'line {n}' for n in range(22))}",
+    f"A long listing {' '.join(f'line {n}' for n in range(22, 30))}",
     "Marked A section with a list that is marked. The list.",
     "Exercise 1: try Do it. (5 min)",
 ]
@@ -240,6 +283,14 @@ def test_links_of_slides_lead_to_the_page(small):
     assert '<a href="second-slides.html">next deck</a>' in text
 
 
+def test_the_plan_counts_the_slides_of_a_deck_and_numbers_those_of_widgets_and_figures(small):
+    plan = re.sub(r"</?span[^>]*>", "", (small / "lecturers.html").read_text("utf-8"))
+    assert f'href="first-slides.html">{len(SAID)} slides</a>' in plan
+    for shown in ("[widget]", "[picture]"):
+        (number,) = [n for n, said in enumerate(SAID, 1) if shown in said]
+        assert f'href="first-slides.html#{number}">slide {number}</a>' in plan
+
+
 def test_a_deck_with_few_slides_and_one_without_its_files_are_found(small, tmp_path):
     expected = [f"first-slides.html: {len(SAID)} slides", "second-slides.html: 1 slides"]
     decks = [line for line in faults(small, 2) if "lecturers.html is missing" not in line]
@@ -255,9 +306,14 @@ def test_a_deck_with_few_slides_and_one_without_its_files_are_found(small, tmp_p
 
 
 @needs_browser
-def test_a_slide_that_overflows_is_found_and_the_others_fit(small):
-    decks = [small / "first-slides.html", small / "second-slides.html"]
-    assert overflowing(decks) == ["second-slides.html: slide 1 overflows"]
+def test_a_slide_that_overflows_and_one_with_small_letters_are_found_and_the_others_fit(small):
+    decks = [small / "first-slides.html", small / "second-slides.html", small / "third-slides.html"]
+    picture = '<svg viewBox="0 0 9 9" width="9" height="9"><text y="9" font-size="9">x</text></svg></h2>'
+    decks[2].write_text(decks[0].read_text("utf-8").replace("</h2>", picture, 1), encoding="utf-8")
+    assert unreadable(decks) == [
+        "second-slides.html: slide 1 overflows",
+        "third-slides.html: slide 1 has small letters",
+    ]
 
 
 @needs_browser
@@ -270,24 +326,30 @@ def test_a_deck_goes_on_by_keys_clicks_and_buttons_and_keeps_its_place(small):
     with chromium("--window-size=1280,800") as browser:
         browser.get((small / "first-slides.html").as_uri())
         body = browser.find_element("css selector", "body")
-        assert number() == "1/7"
-        for key, expected in ((Keys.ARROW_RIGHT, 2), (" ", 3), (Keys.ARROW_LEFT, 2), (Keys.END, 7), (Keys.HOME, 1)):
+        assert number() == "1/9"
+        for key, expected in (
+            (Keys.ARROW_RIGHT, 2),
+            (" ", 3),
+            (Keys.ARROW_LEFT, 2),
+            (Keys.END, len(SAID)),
+            (Keys.HOME, 1),
+        ):
             body.send_keys(key)
-            assert number() == f"{expected}/7"
+            assert number() == f"{expected}/9"
         ActionChains(browser).move_by_offset(900, 600).click().perform()
-        assert number() == "2/7"
+        assert number() == "2/9"
         widget = browser.find_element("css selector", "figure.widget")
         widget.find_element("css selector", ".ask .reveal").click()
         slider = widget.find_element("css selector", "input[name=theta]")
         slider.send_keys(Keys.ARROW_LEFT)  # moves theta, not the deck
-        assert (slider.get_attribute("value"), number()) == ("0.99", "2/7")
+        assert (slider.get_attribute("value"), number()) == ("0.99", "2/9")
         browser.find_element("css selector", "nav button[name=on]").click()
-        assert number() == "3/7"
+        assert number() == "3/9"
         assert browser.current_url.endswith("#3")
         shown = [slide.is_displayed() for slide in browser.find_elements("css selector", ".slide h2")]
-        assert shown == [False, False, True, False, False, False, False]
+        assert shown == [n == 2 for n in range(len(SAID))]
         browser.refresh()
-        assert number() == "3/7"
+        assert number() == "3/9"
         assert [entry["message"] for entry in browser.get_log("browser")] == []
 
 
@@ -319,8 +381,8 @@ if __name__ == "__main__":
     site = Path(sys.argv[1]).resolve()
     wrong = faults(site, lectures())
     if BROWSER and DRIVER:
-        wrong += overflowing(links(site / "lecturers.html"))
-        print("\n".join(wrong) or "each lecture has a deck, and every slide fits")
+        wrong += unreadable(links(site / "lecturers.html"))
+        print("\n".join(wrong) or "each lecture has a deck, and every slide fits and can be read")
     else:
         print("\n".join([*wrong, "no Chromium here: whether slides fit was not looked at"]))
     sys.exit(bool(wrong))
