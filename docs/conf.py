@@ -67,6 +67,12 @@ suppress_warnings = ["ref.python"]
 MATHJAX = "tex-svg-full.js"
 html_theme = "furo"
 html_title = "ndtheory"
+html_favicon = "favicon.svg"
+# Links and marks in the blue of the slides and figures, each with a contrast of 4.5 or more.
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#0061a8", "color-brand-content": "#0061a8"},
+    "dark_css_variables": {"color-brand-primary": "#7cc4ff", "color-brand-content": "#7cc4ff"},
+}
 # Where the site will be, if that is known: the canonical address of a page is that of the newest version.
 if address := os.environ.get("SITE_URL"):
     html_baseurl = f"{address.rstrip('/')}/latest/"

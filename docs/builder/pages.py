@@ -16,7 +16,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
 import verification as vf
-from builder import api, course, documents, equations, notebooks, remedies, search, slides, widgets
+from builder import api, course, documents, equations, notebooks, reading, remedies, search, slides, widgets
 from builder.references import References
 from verification import schemas
 from verification.algorithm import loop, remedy
@@ -201,8 +201,8 @@ class Navigation:
             return make(**options)
         whole = app.env.tocs
         app.env.tocs = self.of_titles(whole)
-        try:
-            return make(**options)
+        try:  # the captions of the theme are headings without a level
+            return make(**options).replace('role="heading"', 'role="heading" aria-level="2"')
         finally:
             app.env.tocs = whole
 
@@ -280,6 +280,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("calls", CallsDirective)
     app.add_directive("remedies", RemediesDirective)
     slides.connect(app)
+    reading.connect(app)
     app.connect("source-read", say_needs)
     app.add_node(gallery)
     app.add_directive("gallery", GalleryDirective)

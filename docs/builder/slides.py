@@ -130,7 +130,7 @@ def cut(page: nodes.document) -> Iterator[Slide]:
     """The slides of a page, in its order.
 
     Each section has a slide with its title, its first sentences and its first formula, table, list or theorem, or the
-    output of a cell; each figure and widget has one; each exercise has one.
+    output of a cell; each further formula, each figure and widget has one; each exercise has one.
     """
     for section in page.findall(nodes.section):
         if not isinstance(section[0], nodes.title):  # what a theorem says
@@ -160,6 +160,11 @@ def cut(page: nodes.document) -> Iterator[Slide]:
             first.blocks = [*kept, last]
             yield first
             yield from (Slide(title=title, anchor=anchor, blocks=[part]) for part in rest)
+            for formula in (block for block in found if isinstance(block, nodes.math_block)):
+                if formula not in first.blocks:
+                    said = [block for block in found[: found.index(formula)] if isinstance(block, nodes.paragraph)][-1]
+                    words = [] if said is paragraph else [opening(said)]
+                    yield Slide(title=title, anchor=anchor, blocks=[*words, formula])
         yield from (Slide(title=title, anchor=anchor, blocks=[picture]) for picture in pictures)
         for slide in filter(None, map(exercise, found)):
             slide.anchor = anchor

@@ -289,6 +289,9 @@ def write(folder: Path) -> None:
     (folder / "formulas.js").write_text(javascript(), encoding="utf-8")
     for name in ("drawing.js", "widgets.css"):
         (folder / name).write_text(files("verification").joinpath("data", name).read_text("utf-8"), encoding="utf-8")
+    preview = stills.plane(plane())
+    preview.set_size_inches(7.5, 3.9375)  # 1200 x 630 pixels, as links are shown elsewhere
+    style.save(preview, folder / "preview.png")
     for name, widget in WIDGETS.items():
         data = widget.data()
         script = f"(window.ndData = window.ndData || {{}}).{name} = {json.dumps(data, separators=(',', ':'))};\n"
@@ -314,7 +317,7 @@ def styles(shown: Iterable[str]) -> list[str]:
 
 
 def element(name: str, static: str) -> str:
-    """The HTML of a widget: a frame that its script fills, its still picture where scripts are off.
+    """The HTML of a widget: a frame that its script fills, its still picture for paper and where scripts are off.
 
     Parameters
     ----------
@@ -322,6 +325,6 @@ def element(name: str, static: str) -> str:
     static : str
         The way to the folder of the pictures, from the page.
     """
-    still = f'<noscript><img src="{static}/{name}.svg" alt="{WIDGETS[name].label}"></noscript>'
+    still = f'<img class="still" loading="lazy" src="{static}/{name}.svg" alt="{WIDGETS[name].label}">'
     page = f'data-site="{static.removesuffix("_static")}"'
     return f'<figure class="widget" data-widget="{name}" {page} aria-label="{WIDGETS[name].label}">{still}</figure>'

@@ -43,7 +43,9 @@
       boxes[id] = box;
       box.setAttribute("tabindex", "0");
       box.setAttribute("role", "button");
-      box.setAttribute("aria-label", `${node.name} ${[...box.querySelectorAll(".short")].map((line) => line.textContent).join(" ")}: ${node.verdict}`);
+      const lines = [...box.querySelectorAll("text")];
+      lines.forEach((line) => line.append(" ")); // what is seen is a part of what is read out, word by word
+      box.setAttribute("aria-label", `${lines.map((line) => line.textContent).join("").trim()}: ${node.verdict}`);
       box.addEventListener("click", () => open(id));
       box.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); open(id); } });
     }

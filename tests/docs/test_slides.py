@@ -19,7 +19,7 @@ from processes import sites
 DOCS = Path(__file__).parents[2] / "docs"
 
 #: At least so many slides in each deck: a title, the sections, three exercises.
-FEWEST = 10
+FEWEST = 11
 
 SLIDE = re.compile(r'<section class="slide">.*?</section>', re.DOTALL)
 #: How a displayed formula begins.
@@ -91,7 +91,7 @@ return [...document.querySelectorAll(".slide")].flatMap((slide, i) => {
   while (walk.nextNode()) {
     const parent = walk.currentNode.parentElement, range = document.createRange();
     range.selectNode(walk.currentNode);
-    if (!walk.currentNode.textContent.trim() || parent.closest("noscript, mjx-container")) continue;
+    if (!walk.currentNode.textContent.trim() || parent.closest("mjx-container")) continue;
     if (!range.getBoundingClientRect().width) continue;
     const drawn = parent.closest("svg") ? parent.getScreenCTM() : { a: 1, b: 0 };
     sizes.push(parseFloat(getComputedStyle(parent).fontSize) * Math.hypot(drawn.a, drawn.b));
@@ -136,6 +136,7 @@ import sys
 
 sys.path.append({docs!r})
 from builder import slides
+from builder import reading
 from builder.pages import WidgetDirective
 
 project, extensions = "slides", ["myst_parser", "sphinx.ext.mathjax", "sphinx_design", "sphinx_proof"]
@@ -147,6 +148,7 @@ html_static_path = [{static!r}, {own!r}, "mathjax.js", *{widgets!r}]
 def setup(app):
     app.add_directive("widget", WidgetDirective)
     slides.connect(app)
+    reading.connect(app)
 """
 
 PLAN = """\
@@ -193,6 +195,14 @@ It is true.
 Then $K < 1$.
 :::
 
+:::{prf:proof}
+It is small.
+:::
+
+:::{prf:proof}
+It is smaller than 1.
+:::
+
 ## A long listing
 
 A file:
@@ -205,6 +215,8 @@ SEVERAL```
 % no slide
 
 It is not on a slide.
+
+$$ y = 1 $$ (eq-line)
 
 ## Marked
 
@@ -242,6 +254,7 @@ SAID = [
     f"A long listing A file: {' '.join(f'line {n}' for n in range(22))}",
     f"A long listing {' '.join(f'line {n}' for n in range(22, 30))}",
     "Marked A section with a list that is marked. The list.",
+    "Marked \\[ z = 1 \\]",
     "Exercise 1: try Do it. (5 min)",
 ]
 
@@ -281,6 +294,17 @@ def test_links_of_slides_lead_to_the_page(small):
     assert 'href="first.html#fig-dot"' in text
     assert text.count('<footer><a href="first.html#') == len(SAID)
     assert '<a href="second-slides.html">next deck</a>' in text
+
+
+def test_no_id_is_given_twice_and_the_page_has_a_description_and_a_note_where_scripts_are_off(small):
+    page = (small / "first.html").read_text("utf-8")
+    ids = re.findall(r'\sid="([^"]+)"', page)
+    assert "equation-eq-line" in ids
+    assert sorted(ids) == sorted(set(ids))
+    assert '<meta name="description" content="It begins. A second sentence is short. A third one is long' in page
+    assert '<meta property="og:title" content="A page about' in page
+    assert page.count("Without it they are shown as they are typed") == 1
+    assert "Without it they are shown" not in (small / "second.html").read_text("utf-8")
 
 
 def test_the_plan_counts_the_slides_of_a_deck_and_numbers_those_of_widgets_and_figures(small):
@@ -326,7 +350,7 @@ def test_a_deck_goes_on_by_keys_clicks_and_buttons_and_keeps_its_place(small):
     with chromium("--window-size=1280,800") as browser:
         browser.get((small / "first-slides.html").as_uri())
         body = browser.find_element("css selector", "body")
-        assert number() == "1/9"
+        assert number() == f"1/{len(SAID)}"
         for key, expected in (
             (Keys.ARROW_RIGHT, 2),
             (" ", 3),
@@ -335,21 +359,21 @@ def test_a_deck_goes_on_by_keys_clicks_and_buttons_and_keeps_its_place(small):
             (Keys.HOME, 1),
         ):
             body.send_keys(key)
-            assert number() == f"{expected}/9"
+            assert number() == f"{expected}/{len(SAID)}"
         ActionChains(browser).move_by_offset(900, 600).click().perform()
-        assert number() == "2/9"
+        assert number() == f"2/{len(SAID)}"
         widget = browser.find_element("css selector", "figure.widget")
         widget.find_element("css selector", ".ask .reveal").click()
         slider = widget.find_element("css selector", "input[name=theta]")
         slider.send_keys(Keys.ARROW_LEFT)  # moves theta, not the deck
-        assert (slider.get_attribute("value"), number()) == ("0.99", "2/9")
+        assert (slider.get_attribute("value"), number()) == ("0.99", f"2/{len(SAID)}")
         browser.find_element("css selector", "nav button[name=on]").click()
-        assert number() == "3/9"
+        assert number() == f"3/{len(SAID)}"
         assert browser.current_url.endswith("#3")
         shown = [slide.is_displayed() for slide in browser.find_elements("css selector", ".slide h2")]
         assert shown == [n == 2 for n in range(len(SAID))]
         browser.refresh()
-        assert number() == "3/9"
+        assert number() == f"3/{len(SAID)}"
         assert [entry["message"] for entry in browser.get_log("browser")] == []
 
 

@@ -6,6 +6,8 @@ import random
 import re
 from math import log10
 from pathlib import Path
+from urllib.parse import unquote
+from xml.etree import ElementTree
 
 import pytest
 from browser import needs_browser
@@ -135,7 +137,7 @@ def test_each_widget_weighs_little_and_has_a_picture(page, builder):
         script = f"{widget.script or name}.js"
         own = sum((folder / file).stat().st_size for file in (script, f"{name}-data.js", f"{name}.svg"))
         assert own + shared < LARGEST
-        assert f'<noscript><img src="./{name}.svg" alt="' in page.read_text(encoding="utf-8")
+        assert f'<img class="still" loading="lazy" src="./{name}.svg" alt="' in page.read_text(encoding="utf-8")
 
 
 # The pictures.
@@ -215,6 +217,34 @@ def test_a_count_in_the_answer_of_the_spectrum_is_that_of_the_library(unanswered
     told = frame(unanswered, "spectrum").find_element("css selector", ".told").text
     assert f"{len(growing)} of {len(eigenvalues)} now exceed 2/theta - 1 = 2.33" in told
     assert not vf.run(swapped, theta="0.6").converged
+
+
+@needs_browser
+def test_after_an_answer_the_words_have_the_focus_and_on_paper_only_the_still_is_shown(unanswered):
+    unanswered.find_element("css selector", "[data-widget=cobweb] .ask button").click()
+    assert unanswered.switch_to.active_element.get_attribute("class") == "told"
+    parts = "[...document.querySelector('[data-widget=cobweb]').children]"
+    shown = f"return {parts}.filter((part) => part.getClientRects().length).map((part) => part.className)"
+    assert "still" not in unanswered.execute_script(shown)
+    unanswered.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    assert unanswered.execute_script(shown) == ["still"]
+    unanswered.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
+@needs_browser
+def test_the_picture_of_a_widget_is_saved_as_an_svg_that_needs_no_style_sheet(unanswered):
+    unanswered.find_element("css selector", "[data-widget=grids] .ask .reveal").click()
+    link = unanswered.find_element("css selector", "[data-widget=grids] .link a[download]")
+    unanswered.execute_script("arguments[0].addEventListener('click', e => e.preventDefault())", link)
+    unanswered.execute_script("arguments[0].click()", link)
+    saved = ElementTree.fromstring(unquote(link.get_attribute("href").partition(",")[2]))
+    charts = [part for part in saved if part.tag.endswith("svg")]
+    assert (len(charts), link.get_attribute("download")) == (2, "grids.svg")
+    lines = [part for part in saved.iter() if part.get("class") == "curve"]
+    assert lines
+    assert all("stroke-width: 2px" in line.get("style") for line in lines)
+    axes = {"".join(text.itertext()) for text in saved.iter() if text.tag.endswith("text")}
+    assert "position along Γc" in axes
 
 
 @needs_browser

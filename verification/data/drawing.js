@@ -17,9 +17,18 @@ window.nd = (() => {
   function svg(tag, attributes = {}, content = null) {
     const node = document.createElementNS(SVG, tag);
     for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-    if (content !== null) node.textContent = content;
+    if (content !== null) node.append(...mathematics(content, (words) => svg("tspan", { "font-size": "75%", "baseline-shift": "sub" }, words)));
     return node;
   }
+
+  // A text with the mathematics between its dollar signs set: $\Gamma_c$ has a Greek letter and an index.
+  function mathematics(text, index) {
+    return String(text).split("$").flatMap((part, i) => (i % 2 === 0 ? [part]
+      : part.replace("\\Gamma", "\u0393").split("_").map((words, j) => (j ? index(words) : words))));
+  }
+
+  // The same as words only.
+  const words = (text) => mathematics(text, (part) => part).join("");
 
   // Five to seven round numbers between two ends; powers of ten on a logarithmic axis.
   function ticks(low, high, logarithmic) {
@@ -46,7 +55,7 @@ window.nd = (() => {
     constructor({ width = 340, height = 250, x, y, label }) {
       this.width = width; this.height = height;
       this.box = { left: 52, right: width - 10, top: 10, bottom: height - 40 };
-      this.root = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label, class: "chart" });
+      this.root = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": words(label), class: "chart" });
       this.frame = svg("g"); this.marks = svg("g");
       this.clip = `nd-clip-${Math.random().toString(36).slice(2)}`;
       const clip = svg("clipPath", { id: this.clip });
@@ -148,6 +157,39 @@ window.nd = (() => {
     return toggle;
   }
 
+  // What a frame shows on a screen; its still picture stays, for paper.
+  function fillWith(figure, ...parts) {
+    figure.dataset.live = "";
+    figure.replaceChildren(...parts, ...figure.querySelectorAll(".still"));
+  }
+
+  // What style sheets say of a drawing.
+  const STYLES = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-opacity", "stroke-dasharray", "opacity", "font-size", "font-family",
+    "font-weight", "text-anchor", "display", "vector-effect"];
+
+  // The drawings of a widget beside each other as one SVG, which needs no style sheet.
+  function drawing(figure) {
+    const shown = [...figure.querySelectorAll("svg")].filter((one) => one.getClientRects().length), whole = svg("svg", { xmlns: SVG });
+    let right = 0, bottom = 0;
+    for (const one of shown) {
+      const box = one.viewBox.baseVal, width = box.width || one.clientWidth, height = box.height || one.clientHeight, copy = one.cloneNode(true);
+      const parts = [one, ...one.querySelectorAll("*")];
+      [copy, ...copy.querySelectorAll("*")].forEach((part, i) => {
+        const style = getComputedStyle(parts[i]);
+        for (const name of STYLES) part.style.setProperty(name, style.getPropertyValue(name));
+      });
+      for (const [name, value] of Object.entries({ x: right, y: 0, width, height, overflow: "hidden" })) copy.setAttribute(name, value);
+      whole.append(copy);
+      right += width; bottom = Math.max(bottom, height);
+    }
+    whole.setAttribute("viewBox", `0 0 ${right} ${bottom}`);
+    whole.prepend(svg("rect", { width: right, height: bottom, fill: getComputedStyle(document.body).backgroundColor }));
+    return new XMLSerializer().serializeToString(whole);
+  }
+
+  const saving = (figure, name) => html("a", { href: "#", download: `${name}.svg`,
+    onclick: (event) => { event.target.href = `data:image/svg+xml,${encodeURIComponent(drawing(figure))}`; } }, "save as SVG");
+
   // A frame for a widget: a question to answer first, controls, pictures, what they say, the numbers, a link.  Where the
   // right answer is given, the outcome is hidden until somebody answers: what is not in `pictures` waits, and draw() leaves
   // out what `revealed` is for. Then the words say why, and show() moves the widget to the state that shows it.
@@ -156,16 +198,17 @@ window.nd = (() => {
     const widget = { name, sliders: {}, buttons: {}, revealed: given, controls: html("div", { class: "controls" }),
       pictures: html("div", { class: "pictures" }), says: html("p", { class: "says", "aria-live": "polite" }),
       table: html("table"), link: html("a", { href: "#" }, "link to this state") };
-    const told = html("p", { class: "told", hidden: "", "aria-live": "polite" });
+    const told = html("p", { class: "told", hidden: "", tabindex: "-1" }); // takes the focus, which has it read
     widget.told = told;
     const ask = html("fieldset", { class: "ask" }, html("legend", {}, `Predict first. ${question}`));
     const outcome = [widget.controls, widget.says, html("details", {}, html("summary", {}, "The numbers of this picture"), widget.table),
-      html("p", { class: "link" }, widget.link)];
+      html("p", { class: "link" }, widget.link, " \u00b7 ", saving(figure, name))];
     const open = (words) => {
       told.textContent = words; told.hidden = false; widget.revealed = true; ask.hidden = true;
       for (const part of outcome) part.hidden = false;
       show(); widget.update();
       widget.answered = true;
+      told.focus({ preventScroll: true }); // the button that had it is gone
     };
     const verdict = (answer) => (right === null ? `You said: ${answer}.` : answer === right ? "Right:" : "Not quite:");
     for (const answer of answers) {
@@ -174,7 +217,7 @@ window.nd = (() => {
     ask.append(html("button", { type: "button", class: "reveal", onclick: () => open(`${right === null ? "" : "Answer: "}${reveal()}`) }, "Just show me"));
     ask.hidden = given;
     for (const part of outcome) part.hidden = right !== null && !given;
-    figure.replaceChildren(ask, told, outcome[0], widget.pictures, ...outcome.slice(1));
+    fillWith(figure, ask, told, outcome[0], widget.pictures, ...outcome.slice(1));
     widget.update = () => {
       if (!widget.ready) return;
       draw(widget);
@@ -203,5 +246,5 @@ window.nd = (() => {
     if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", begin); else begin();
   }
 
-  return { COLOURS, Chart, build, button, digits, fill, html, onPage, short, slider, start, svg };
+  return { COLOURS, Chart, build, button, digits, fill, fillWith, html, onPage, saving, short, slider, start, svg };
 })();

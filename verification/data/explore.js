@@ -12,8 +12,8 @@ nd.onPage("explore", (figure) => {
   const says = nd.html("p", { class: "answer", "aria-live": "polite" });
   const pictures = nd.html("div", { class: "pictures" });
   const table = nd.html("table"), link = nd.html("a", { href: "#" }, "link to this state");
-  figure.replaceChildren(says, widget.controls, pictures, nd.html("details", {}, nd.html("summary", {}, "The numbers of this run"), table),
-    nd.html("p", { class: "link" }, link));
+  nd.fillWith(figure, says, widget.controls, pictures, nd.html("details", {}, nd.html("summary", {}, "The numbers of this run"), table),
+    nd.html("p", { class: "link" }, link, " \u00b7 ", nd.saving(figure, "explore")));
 
   const slider = (name, label, values, value) => nd.slider(widget, { name, label, low: 0, high: values.length - 1, step: 1, value,
     show: (i) => `${name === "friction" ? "k" : name} = ${number(values[i])}` });
@@ -262,7 +262,7 @@ nd.onPage("explore", (figure) => {
       const signed = (value) => number(Math.abs(value) < 1e-9 * Math.max(...told[k].normal) ? 0 : value);
       says.textContent = `k = ${number(data.friction[k])}, increment ${i + 1} of ${past.planned}, time ${number(each.time[i])} (${each.name[i]}): theta = ${number(data.theta[0])} took ${each.iterations[i]} steps. `
         + `Force on body 2: normal ${signed(each.normal[i])}, tangential ${signed(each.tangential[i])} ${unit}.`
-        + (plane ? ` Friction took ${signed(each.dissipated[i])} ${unit}^2 so far.` : "")
+        + (plane ? ` Friction took ${signed(each.dissipated[i])} ${unit}\u00b2 so far.` : "")
         + (run.outcome === "converged" ? "" : ` The history ends early: ${run.outcome}.`);
       stageTitle.textContent = `The bodies at time ${number(each.time[i])}`;
       stepText.textContent = `${i + 1} of ${past.planned}`;

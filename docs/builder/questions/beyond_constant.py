@@ -127,7 +127,7 @@ def data() -> dict[str, Any]:
                 ],
             ),
             chart(
-                "Pressure along Gamma_c",
+                r"Pressure along $\Gamma_c$",
                 axis("x [mm]", 0.35, 1.65),
                 axis("pressure [MPa]", 0, 3000),
                 [line(pressure(solution), "grey"), note(1, 760, "solid: solution", "grey", anchor="middle")],

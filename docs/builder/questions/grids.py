@@ -12,9 +12,7 @@ import verification as vf
 from builder.scenes import axis, chart, dots, line, note, scene, slider, widget
 from fem1d2d import mortar
 
-LABEL = (
-    "Pressure along Gamma_c of two pressed blocks with three transfers, and how far it varies over the number of cells"
-)
+LABEL = "Pressure between two pressed blocks with three transfers, and how far it varies over the number of cells"
 
 #: Each mesh of the page, this many times as fine.
 FINER = (1, 2, 4, 10)
@@ -120,8 +118,8 @@ def data() -> dict[str, Any]:
         ],
         charts=[
             chart(
-                "Pressure along Gamma_c",
-                axis("position along Gamma_c", -0.03, 1.03),
+                r"Pressure along $\Gamma_c$",
+                axis(r"position along $\Gamma_c$", -0.03, 1.03),
                 axis("pressure, the exact one = 1", 0.6, 1.4),
                 fixed=[line([(0, 1), (1, 1)], "grey", dashed=True), note(0, 1.35, "dashed: exact", "grey")],
                 before=[
@@ -131,7 +129,7 @@ def data() -> dict[str, Any]:
             ),
             chart(
                 "Variation of the pressure over the number of cells",
-                axis("cells of the lower block along Gamma_c", 0, 90),
+                axis(r"cells of the lower block along $\Gamma_c$", 0, 90),
                 axis("variation of the pressure, percent", -4, 80),
             ),
         ],
