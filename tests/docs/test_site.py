@@ -273,6 +273,17 @@ def test_every_code_name_on_the_notation_page_exists():
         resolve(name)
 
 
+#: A word of a figure in which the contact line is typed as in a program.
+UNSET = re.compile(r"""(?:label|title)\s*=\s*[rf]{0,2}"[^"$]*Gamma_c|\[r?"[^"$]*Gamma_c[^"$]*"\] =""")
+
+
+def test_figures_of_pages_set_the_contact_line_as_mathematics():
+    assert UNSET.search('ax.set(xlabel="position along Gamma_c")')
+    assert not UNSET.search(r'ax.set(xlabel=r"position along $\Gamma_c$")')
+    pages = [*DOCS.glob("*.md"), *(DOCS / "examples").glob("*.md"), *(DOCS / "builder").rglob("*.py")]
+    assert [page.name for page in pages if UNSET.search(page.read_text("utf-8"))] == []
+
+
 if __name__ == "__main__":
     if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "index.html").exists():
         sys.exit("usage: python tests/docs/test_site.py DIRECTORY, the directory of a built site")
