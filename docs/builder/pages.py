@@ -201,8 +201,8 @@ class Navigation:
             return make(**options)
         whole = app.env.tocs
         app.env.tocs = self.of_titles(whole)
-        try:  # the captions of the theme are headings without a level
-            return make(**options).replace('role="heading"', 'role="heading" aria-level="2"')
+        try:
+            return make(**options)
         finally:
             app.env.tocs = whole
 

@@ -49,6 +49,8 @@ def description(doctree: nodes.document) -> str:
 
 def describe(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: nodes.document | None) -> None:
     """Put the description of a page and the tags of its preview into its head, and the note on formulas on it."""
+    tree = context.get("furo_navigation_tree", "")  # its captions are headings without a level
+    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
     if doctree is None:
         return
     title = nodes.Text(re.sub(r"<[^>]+>", "", context["title"])).astext()
@@ -70,5 +72,5 @@ def describe(app: Sphinx, page: str, template: str, context: dict[str, Any], doc
 def connect(app: Sphinx) -> None:
     """Events of all pages."""
     app.connect("doctree-resolved", give_ids_once)
-    app.connect("html-page-context", describe)
+    app.connect("html-page-context", describe, priority=900)  # after the theme
     app.add_js_file(None, body=KEYBOARD)

@@ -157,6 +157,8 @@ PLAN = """\
 {slides}`first`: {slide}`cobweb`, {slide}`fig-dot`; then {slides}`second`
 
 ```{toctree}
+:caption: Pages
+
 first
 second
 ```
@@ -304,6 +306,7 @@ def test_no_id_is_given_twice_and_the_page_has_a_description_and_a_note_where_sc
     assert '<meta name="description" content="It begins. A second sentence is short. A third one is long' in page
     assert '<meta property="og:title" content="A page about' in page
     assert page.count("Without it they are shown as they are typed") == 1
+    assert page.count('role="heading" aria-level="2"') == page.count('role="heading"') == 1
     assert "Without it they are shown" not in (small / "second.html").read_text("utf-8")
 
 
