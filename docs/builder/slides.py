@@ -122,7 +122,12 @@ def in_parts(block: nodes.Node) -> list[nodes.Node]:
     lines = block.astext().splitlines() if isinstance(block, nodes.literal_block) else []
     if len(lines) <= LINES:
         return [block]
-    parts = ["\n".join(lines[begin : begin + LINES]) for begin in range(0, len(lines), LINES)]
+    parts = []
+    while len(lines) > LINES:  # at an empty line, where there is one in the second half
+        end = next((n for n in range(LINES, LINES // 2, -1) if not lines[n].strip()), LINES)
+        parts.append("\n".join(lines[:end]))
+        lines = lines[end + 1 :] if not lines[end].strip() else lines[end:]
+    parts.append("\n".join(lines))
     return [nodes.literal_block(text, text, **block.attributes) for text in parts]
 
 

@@ -17,7 +17,13 @@ window.nd = (() => {
   function svg(tag, attributes = {}, content = null) {
     const node = document.createElementNS(SVG, tag);
     for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-    if (content !== null) node.append(...mathematics(content, (words) => svg("tspan", { "font-size": "75%", "baseline-shift": "sub" }, words)));
+    if (content === null) return node;
+    const lower = 3;
+    let shifted = 0;
+    for (const part of mathematics(content, (words) => svg("tspan", { "font-size": "85%", dy: lower }, words))) {
+      node.append(shifted && typeof part === "string" && part ? svg("tspan", { dy: -lower }, part) : part);
+      shifted = typeof part !== "string";
+    }
     return node;
   }
 
@@ -79,7 +85,7 @@ window.nd = (() => {
         this.frame.append(svg("path", { d: `M${left},${this.toY(value)}h-4`, class: "axis" }),
           svg("text", { x: left - 6, y: this.toY(value) + 3.5, "text-anchor": "end" }, short(value)));
       }
-      this.frame.append(svg("text", { x: (left + right) / 2, y: this.height - 6, "text-anchor": "middle" }, x.name),
+      this.frame.append(svg("text", { x: (left + right) / 2, y: this.height - 8, "text-anchor": "middle" }, x.name),
         svg("text", { transform: `translate(11,${(top + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, y.name));
     }
 
