@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
-from ndtheory.number import decimal
+from ndtheory.number import typed
 from ndtheory.texts import printable
 
 #: Most characters of a value that a message repeats.
@@ -25,12 +23,7 @@ class HypothesisError(ValueError):
     """
 
     def __init__(self, key: str, value: object, needed: str) -> None:
-        shown = value
-        if isinstance(value, Fraction) and max(abs(value.numerator), value.denominator) > 10**17:
-            shown = decimal(value)
-        elif isinstance(value, int) and value.bit_length() > 1000:
-            shown = f"an integer of {value.bit_length()} bits"
-        text = printable(str(shown))  # one line, whatever was received
+        text = printable(typed(value))  # one line, whatever was received
         text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
         super().__init__(f"{key} = {text}: needed {needed}")
         self.key = key

@@ -37,6 +37,23 @@ LARGEST, SMALLEST = Fraction(10**LARGEST_EXPONENT), Fraction(1, 10**LARGEST_EXPO
 OF_SIZE = f"of a size between 1e-{LARGEST_EXPONENT} and 1e{LARGEST_EXPONENT}"
 
 
+def typed(value: object) -> str:
+    """A value as a user would type it: numbers in 12 digits, fractions that are no decimals as such.
+
+    >>> typed(0.1 + 0.2), typed(Fraction(3, 10)), typed(Fraction(1, 3)), typed(12.0)
+    ('0.3', '0.3', '1/3', '12.0')
+    """
+    if isinstance(value, int) and value.bit_length() > 1000:
+        return f"an integer of {value.bit_length()} bits"
+    if isinstance(value, Fraction):
+        n, d = value.as_integer_ratio()
+        if max(abs(n), d) < 10**15 and (d == 1 or 10 ** d.bit_length() % d):  # or no decimal
+            return str(value)
+        return str(Context(prec=12).create_decimal(decimal(value)).normalize()).lower()
+    text = str(value)
+    return f"{value:.12g}" if isinstance(value, float) and len(text) > 14 else text
+
+
 class UnusualSize(ValueError):
     """A finite number larger than LARGEST, or smaller than SMALLEST and not 0; ``near`` is the nearest accepted one."""
 

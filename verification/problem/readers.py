@@ -174,11 +174,9 @@ def polyline(value: Any, at: At) -> tuple[tuple[Fraction, ...], ...]:
 
 def forces_at(value: Any, at: At) -> dict[tuple[Fraction, ...], Components]:
     """Read forces by the points at which they act, in tables of both."""
-    if not isinstance(value, (list, tuple)) or not all(isinstance(each, Mapping) for each in value):
-        raise Unfit("needed a list of tables, as [{ at = [1.0, 0.3], force = [0.0, -60.0] }]")
+    needed = "needed a list of tables, as [{ at = [1.0, 0.3], force = [0.0, -60.0] }]"
     found: dict[tuple[Fraction, ...], Components] = {}
-    for i, each in enumerate(value, 1):
-        table = at.table.within(f"{at.name}[{i}]", each)
+    for table in tables_of(at.table, at.name, needed)(value):
         point = table.take("at", lambda given: place(given, at))
         if point in found:
             raise table.refuse("at", list(point), "needed one force for each point")
@@ -199,7 +197,7 @@ def by_surface(value: Any, at: At, read: Callable[[Any], Fraction]) -> Any:
 
 def side_list(value: Any, at: At) -> tuple[str, ...]:
     """Read a list of sides."""
-    if not isinstance(value, (list, tuple)) or not all(isinstance(name, str) for name in value):
+    if not _all_are(str, value):
         raise Unfit('needed a list of side names, as ["bottom"]')
     known = sides(at)
     for name in value:
@@ -214,7 +212,7 @@ def side_list(value: Any, at: At) -> tuple[str, ...]:
 def groups(value: Any) -> tuple[str, ...]:
     """Read the name of a group of cells, or a list of some."""
     names = [value] if isinstance(value, str) else value
-    if not isinstance(names, (list, tuple)) or not names or not all(isinstance(name, str) for name in names):
+    if not names or not _all_are(str, names):
         raise Unfit('needed a name of a surface in quotes, or a list of some, as ["left", "wing"]')
     if len(set(names)) < len(names):
         raise Unfit("needed each surface once")
@@ -242,12 +240,16 @@ def roles(value: Any, at: At) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
-def tables_of(top: TomlTable, name: str) -> Callable[[Any], list[TomlTable]]:
+def _all_are(kind: type, value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and all(isinstance(each, kind) for each in value)
+
+
+def tables_of(top: TomlTable, name: str, needed: str = "") -> Callable[[Any], list[TomlTable]]:
     """Return a reader of an array of tables."""
 
     def read(value: Any) -> list[TomlTable]:
-        if not isinstance(value, (list, tuple)) or not all(isinstance(each, Mapping) for each in value):
-            raise Unfit(f"needed tables, each as [[{name}]]")
+        if not _all_are(Mapping, value):
+            raise Unfit(needed or f"needed tables, each as [[{name}]]")
         return [top.within(f"{name}[{i}]", each) for i, each in enumerate(value, 1)]
 
     return read

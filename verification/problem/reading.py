@@ -94,7 +94,10 @@ def _bodies_of_several(top: TomlTable, around: Mapping[str, Any]) -> dict[int, B
     bodies = {i: _read_body(top.table(f"body{i}", required=True), around) for i in numbers}
     for i, body in bodies.items():
         if body.rigid:
-            raise top.refuse(f"body{i}.shape", "rigid", "needed an elastic body: an obstacle has no named sides")
+            needed = (
+                "needed an elastic body where there are several; one that is fixed and stiff stands for an obstacle"
+            )
+            raise top.refuse(f"body{i}.shape", "rigid", needed)
         if not _within([bodies[j] for j in numbers if j <= i], MOST_WITHIN):
             needed = f"needed a modulus within {float(MOST_WITHIN):g} times those before it"
             raise top.refuse(f"body{i}.young", body.young, needed)
@@ -256,7 +259,8 @@ def _read_loads(
         if not first and side not in held:
             raise refuse("needed a side that the body or the first step prescribes: supports stay through a history")
         if [v is None for v in held.setdefault(side, values)] != [v is None for v in values]:
-            raise refuse('needed "free" where it was "free" before, only there: supports stay through a history')
+            needed = 'needed "free" where it was "free" before, only there: supports stay through a history'
+            raise refuse(f"{needed}; prescribe this component in each step, in place of a traction")
     _check_tractions(table, loads.traction, body.fixed, held)
     table.close()
     return loads

@@ -12,7 +12,7 @@ from string import digits
 from typing import Any, TypeVar
 
 from ndtheory import exact
-from ndtheory.number import UnusualSize, decimal
+from ndtheory.number import UnusualSize, typed
 from ndtheory.texts import CONTROL, did_you_mean, nearest, printable
 
 V = TypeVar("V")
@@ -94,14 +94,10 @@ def show(value: object) -> str:
     """Write a value on one short line, as a problem file writes it."""
     if isinstance(value, bool):
         text = str(value).lower()
-    elif isinstance(value, int) and value.bit_length() > 1000:
-        text = f"an integer of {value.bit_length()} bits"
     elif isinstance(value, str):
         text = repr(value).replace("'", '"')
-    elif isinstance(value, Fraction) and max(abs(value.numerator), value.denominator) > 10**17:
-        text = f"{decimal(value):.6g}"
-    elif isinstance(value, (Decimal, Fraction)):
-        text = str(value)
+    elif value is None:  # a component
+        text = '"free"'
     elif isinstance(value, Path):  # its end names the file
         name = str(value)
         return show(name if len(name) < LONGEST - 2 else "..." + name[5 - LONGEST :])
@@ -110,7 +106,7 @@ def show(value: object) -> str:
     elif isinstance(value, (list, tuple)):
         text = "[" + ", ".join(map(show, value)) + "]"
     else:
-        text = str(value)
+        text = typed(value)
     return short(" ".join(text.split()), LONGEST)
 
 

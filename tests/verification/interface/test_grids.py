@@ -238,7 +238,7 @@ def test_the_iteration_refuses_a_law_that_takes_the_forces_of_the_contact_grid()
 
 
 def test_a_kernel_that_reaches_no_node_of_the_neumann_grid_is_refused():
-    with pytest.raises(vf.ProblemError, match=r"contact\.radius = 1/1000: .*larger"):
+    with pytest.raises(vf.ProblemError, match=r"contact\.radius = 0\.001: .*larger"):
         vf.solve(vf.Problem.from_dict(changed(APART, body1={"x": ["0.38", "1.71"]}, contact={"radius": "0.001"})))
 
 

@@ -122,7 +122,7 @@ def test_points_and_forces_belong_to_their_own_body_of_several():
 
 
 REFUSED = {
-    "held": ({"at": [1, "0.3"], "force": [0, 1]}, r"body2\.point_load = \[1, 3/10\]: the node there is held"),
+    "held": ({"at": [1, "0.3"], "force": [0, 1]}, r"body2\.point_load = \[1, 0.3\]: the node there is held"),
     "outside": ({"at": [1, 9], "force": [0, 1]}, r"body2\.point_load = \[1, 9\]: no node lies within half an edge"),
 }
 
