@@ -8,12 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d.mesh import Bools, Floats, Ints, Mesh, MeshError
+from fem1d2d.mesh import Bools, Floats, Ints, Mesh, MeshError, place_of
 from fem1d2d.trace import SAME
 
 #: Pairs of an edge and a node that are computed together: arrays of some 10 MB.
@@ -63,7 +62,7 @@ class Line:
             if line.nodes[-1] == other.nodes[0]:
                 raise MeshError(line.corner(other, side))
         if others:
-            raise MeshError(f"side {side!r} has several pieces, one of which ends at {_at(line.points[-1])}")
+            raise MeshError(f"side {side!r} has several pieces, one of which ends at {place_of(line.points[-1])}")
         if line.nodes[0] == line.nodes[-1]:
             raise MeshError(f"side {side!r} is closed: needed a line with two ends")
         return line
@@ -132,7 +131,7 @@ class Line:
         """Why the corner at which this line ends and another one begins lies on no line of contact."""
         turn = _turns(np.vstack([self.points[-2:], following.points[1:2]]))[1]
         return (
-            f"the corner of side {side!r} at {_at(self.points[-1])} has {turn:.3g} degrees: needed at most"
+            f"the corner of side {side!r} at {place_of(self.points[-1])} has {turn:.3g} degrees: needed at most"
             f" {SHARPEST:g}; cut it there, or mesh a curve finer"
         )
 
@@ -184,14 +183,18 @@ class Line:
         ends = np.flatnonzero(np.diff(faces.astype(int), append=0) == -1)
         whole = [slice(begin, end + 1) for begin, end in zip(begins, ends, strict=True) if end > begin]
         if not whole:
-            raise MeshError(f"does not face {_at(self.points[0])}, nor any edge of that line as a whole")
+            raise MeshError(f"does not face {place_of(self.points[0])}, nor any edge of that line as a whole")
         if len(whole) > 1:
-            raise MeshError(f"does not face {_at(self.points[whole[0].stop])}, but parts on both sides of it")
+            raise MeshError(f"does not face {place_of(self.points[whole[0].stop])}, but parts on both sides of it")
         kept = whole[0]
         if (np.diff(met[kept]) <= 0).any():
             back = kept.start + int(np.argmin(np.diff(met[kept])))
-            raise MeshError(f"is met by normals that cross near {_at(self.points[back])}")
-        return Line(nodes=between.nodes[kept], points=between.points[kept], normals=between.normals[kept])
+            raise MeshError(f"is met by normals that cross near {place_of(self.points[back])}")
+        return between.part(kept)
+
+    def part(self, kept: slice) -> Line:
+        """The line between two of its nodes."""
+        return Line(nodes=self.nodes[kept], points=self.points[kept], normals=self.normals[kept])
 
     def curve(self, s: Floats) -> Floats:
         """Points on the smooth curve through the nodes at positions, shape (len(s), 2)."""
@@ -213,7 +216,7 @@ class Line:
         """
         met, faces = self._meetings(other)
         if not faces.all():
-            raise MeshError(f"does not face {_at(self.points[np.argmin(faces)])}")
+            raise MeshError(f"does not face {place_of(self.points[np.argmin(faces)])}")
         gap = ((other.curve(met) - self.points) * self.normals).sum(axis=1)
         s = _onto(other.s, met, self.s)
         reaches = np.append(s[1:] > self.slack, True) & np.insert(s[:-1] < self.s[-1] - self.slack, 0, True)
@@ -330,7 +333,3 @@ def _directions(vectors: Floats) -> Floats:
     along = np.abs(found) > 1 - SAME**2 / 2
     found[along] = np.rint(found[along])
     return np.asarray(found)
-
-
-def _at(point: NDArray[Any]) -> str:
-    return f"({float(point[0]):g}, {float(point[1]):g})"

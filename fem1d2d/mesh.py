@@ -62,6 +62,8 @@ class Mesh(Cells):
         Cells of a file that were cut into these, in words.
     shares : mapping from text to bool
         The named surfaces of a file of which it takes a group, as ``wing of both.msh``: True if it has cells of them.
+    off : mapping from name to str
+        Named lines of a file that are no edges of the boundary, and no sides: where they are, in words.
     centres : int array, shape (q,)
         Nodes in the middle of quadrilaterals that were split by both diagonals.
 
@@ -81,6 +83,7 @@ class Mesh(Cells):
     surfaces: Mapping[str, Ints] = field(default_factory=dict)
     cut: str = ""
     shares: Mapping[str, bool] = field(default_factory=dict)
+    off: Mapping[str, str] = field(default_factory=dict)
     centres: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     boundary: Ints = field(init=False, repr=False)
 
@@ -129,11 +132,11 @@ class Mesh(Cells):
             named = undirected(facets, len(points))
             wrong = ~np.isin(named, on_boundary)
             if wrong.any():
-                inside = _where(points, facets[int(np.argmax(wrong))])
+                inside = where(points, facets[int(np.argmax(wrong))])
                 raise MeshError(f"side {name!r} has a facet {inside}, which is none of the boundary")
             _, first, count = np.unique(named, return_index=True, return_counts=True)
             if (count > 1).any():
-                twice = _where(points, facets[first[np.argmax(count > 1)]])
+                twice = where(points, facets[first[np.argmax(count > 1)]])
                 raise MeshError(f"side {name!r} lists the facet {twice} {count.max()} times: once is needed")
         surfaces = {name: np.array(members, dtype=np.int64) for name, members in self.surfaces.items()}
         centres = np.array(self.centres, dtype=np.int64)
@@ -149,12 +152,16 @@ class Mesh(Cells):
 
     def __reduce__(self) -> tuple[Any, ...]:  # a read-only mapping cannot be pickled, and numpy returns writable arrays
         whole: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self) if field.init}
-        return partial(Mesh, **whole | {name: dict(whole[name]) for name in ("sides", "surfaces", "shares")}), ()
+        return partial(Mesh, **whole | {name: dict(whole[name]) for name in ("sides", "surfaces", "shares", "off")}), ()
 
     def along(self, side: str) -> Ints:
         """Return the facets of a named side as the boundary has them, with the mesh on the left of an edge."""
         on_boundary, on_side = (undirected(each, len(self.points)) for each in (self.boundary, self.sides[side]))
         return self.boundary[np.isin(on_boundary, on_side)]
+
+    def lacks(self, side: str) -> str:
+        """Why it has no side of that name: where such a line of the file lies, else the names of its sides."""
+        return self.off.get(side, f"its sides: {', '.join(self.sides)}")
 
     @property
     def quadrilaterals(self) -> tuple[Ints, Ints]:
@@ -227,9 +234,14 @@ def _whole(what: str, values: Any, columns: int) -> Ints:
     return array.astype(np.int64)
 
 
-def _where(points: NDArray[Any], facet: Ints) -> str:
+def place_of(point: Iterable[Any]) -> str:
+    """A point, for a message."""
+    return f"({', '.join(f'{float(c):g}' for c in point)})"
+
+
+def where(points: NDArray[Any], facet: Ints) -> str:
     """Place of a facet, for a message."""
-    ends = [f"({', '.join(f'{float(c):.6g}' for c in points[node])})" for node in facet]
+    ends = [place_of(points[node]) for node in facet]
     return f"at {ends[0]}" if len(ends) == 1 else f"from {ends[0]} to {ends[1]}"
 
 
@@ -256,7 +268,7 @@ def _boundary(points: NDArray[Any], cells: Ints) -> Ints:
         one, other = np.flatnonzero(inverse == inverse[facet])[:2] % len(cells)
         if set(cells[one].tolist()) == set(cells[other].tolist()):
             raise MeshError(f"cells {one} and {other} have the same nodes: each cell is needed once")
-        raise MeshError(f"cells {one} and {other} lie on the same side of the facet {_where(points, facets[facet])}")
+        raise MeshError(f"cells {one} and {other} lie on the same side of the facet {where(points, facets[facet])}")
     either = directed // 2
     alone = np.ones(len(either), dtype=bool)
     alone[1:] &= either[1:] != either[:-1]

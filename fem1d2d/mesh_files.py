@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fem1d2d import mesh_reader
-from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, edges, measures, undirected
+from fem1d2d.mesh import Cells, Floats, Ints, Mesh, MeshError, edges, measures, undirected, where
+from fem1d2d.supports import pieces
 from fem1d2d.trace import SAME
 
 #: Limits of the process that reads: seconds of processor time and bytes of memory, at least and for each byte of the
@@ -39,8 +40,8 @@ def from_file(
 
     Quadrilaterals and cells of second order are cut into triangles (:mod:`fem1d2d.mesh_reader`); ``cut`` of the mesh
     says so.  A cell that the file lists clockwise is turned over; points that no cell uses and names without lines are
-    left out.  Its ``surfaces`` are the named groups of cells; if these split the mesh it is refused, unless not
-    ``one_material``.
+    left out, lines inside the body or off its cells too: ``off`` of the mesh says where they are.  Its ``surfaces`` are
+    the named groups of cells; if these split the mesh it is refused, unless not ``one_material``.
 
     Parameters
     ----------
@@ -49,8 +50,8 @@ def from_file(
     plane : {'strain', 'stress'}, optional
         The plane problem that the mesh is for: elements of Abaqus that are made for the other one are refused.
     group : sequence of str, optional
-        Named surfaces that are the mesh, of a file that holds several bodies.  Of its sides the parts on their outline
-        are left, also where another body begins.
+        Named surfaces that are the mesh, of a file that holds several bodies, or a piece of one, as in
+        :func:`with_pieces`.  Of its sides the parts on their outline are left, also where another body begins.
 
     Raises
     ------
@@ -74,21 +75,10 @@ def from_file(
 
 
 def contents(path: Path) -> Read:
-    """Read all of a mesh file, which may hold bodies that lie on each other; the MeshErrors do not name it."""
-    _check_kind(path)
-    return read_in_process(path)
+    """Read all of a mesh file, which may hold bodies that lie on each other; the MeshErrors do not name it.
 
-
-def part_of(read: Read, group: Sequence[str]) -> Mesh:
-    """Make the mesh of a body in a file: of some of its named surfaces, or of all cells where none are named.
-
-    MeshError as :func:`from_file`; materials and plane are not checked.
+    Paths without a regular file and endings of other formats are refused unread.
     """
-    return _plane_mesh(_of_group(read, group))
-
-
-def _check_kind(path: Path) -> None:
-    """Refuse a path without a regular file, and endings of other formats."""
     try:
         if not path.exists():
             raise MeshError("no such mesh file")
@@ -102,6 +92,15 @@ def _check_kind(path: Path) -> None:
             f"needed a Gmsh file (.msh) or an Abaqus file (.inp), this one has {ending};"
             " `meshio convert -o gmsh22 FILE out.msh` writes a Gmsh file"
         )
+    return read_in_process(path)
+
+
+def part_of(read: Read, group: Sequence[str]) -> Mesh:
+    """Make the mesh of a body in a file: of some of its named surfaces, or of all cells where none are named.
+
+    MeshError as :func:`from_file`; materials and plane are not checked.
+    """
+    return _plane_mesh(_of_group(read, group))
 
 
 class Read(NamedTuple):
@@ -116,6 +115,7 @@ class Read(NamedTuple):
     cut: str
     plane: Mapping[str, str]
     shares: Mapping[str, bool] = MappingProxyType({})
+    off: Mapping[str, str] = MappingProxyType({})
 
 
 def read_in_process(path: Path) -> Read:
@@ -164,23 +164,35 @@ def read_in_process(path: Path) -> Read:
 
 def _of_group(read: Read, group: Sequence[str], file: str = "it") -> Read:
     """The part of a file that some of its named surfaces make; all of it where none are named."""
+    flat, sides, off = read.points[:, :2], dict[str, Ints](), dict[str, str]()
+    if not read.surfaces.keys() >= {*group}:
+        read = with_pieces(read)
+    if unknown := [name for name in group if name not in read.surfaces]:
+        known = ", ".join(read.surfaces) or "none"
+        raise MeshError(f"no surface {unknown[0]!r}; needed names of surfaces (element sets) in it: {known[:200]}")
+    members = [read.surfaces[name] for name in group] or [np.arange(len(read.triangles))]
+    chosen = np.unique(np.concatenate(members))
+    facets = edges(read.triangles[chosen])
+    codes, first, times = np.unique(undirected(facets, len(flat)), return_index=True, return_counts=True)
+    outline = facets[first[times == 1]]
+    for name, line in read.sides.items():
+        on = np.isin(undirected(line, len(flat)), codes[times == 1])
+        if on.all() or (group and on.any()) or not len(outline):
+            sides[name] = line[on]
+        else:
+            lost = line[int(np.argmin(on))]
+            near = np.linalg.norm(flat[outline].mean(axis=1) - flat[lost].mean(axis=0), axis=1).argmin()
+            places = f"lies on no outer edge {where(flat, lost)}; the nearest one runs {where(flat, outline[near])}"
+            off[name] = f"the line {name!r} of the file {places}"
+    read = read._replace(sides=sides, off=off)
     if not group:
         return read
-    if unknown := [name for name in group if name not in read.surfaces]:
-        named = ", ".join(read.surfaces) or "none"
-        raise MeshError(f"no surface {unknown[0]!r}; needed names of surfaces (element sets) in it: {named[:200]}")
-    chosen = np.unique(np.concatenate([read.surfaces[name] for name in group]))
-    triangles, count = read.triangles[chosen], len(read.points)
-    codes, times = np.unique(undirected(edges(triangles), count), return_counts=True)
-    outline = codes[times == 1]
-    sides = {name: facets[np.isin(undirected(facets, count), outline)] for name, facets in read.sides.items()}
     own = {name: np.flatnonzero(np.isin(chosen, members)) for name, members in read.surfaces.items()}
     bare = np.setdiff1d(np.arange(len(read.triangles)), np.concatenate([*read.surfaces.values()]))
     shares = {f"{name} of {file}": len(members) > 0 for name, members in own.items()}
     shares |= {f"{len(bare)} triangles without a name of {file}": False} if len(bare) else {}
     return read._replace(
-        triangles=triangles,
-        sides={name: facets for name, facets in sides.items() if len(facets)},
+        triangles=read.triangles[chosen],
         surfaces={name: members for name, members in own.items() if len(members)},
         split="",
         cut=f"the file's {read.cut}" if read.cut else "",
@@ -188,19 +200,21 @@ def _of_group(read: Read, group: Sequence[str], file: str = "it") -> Read:
     )
 
 
+def with_pieces(read: Read) -> Read:
+    """Name the pieces of a surface that share no edge: ``all.1``, ``all.2`` of ``all``, in the order of the file."""
+    piece, found = pieces(Cells(points=read.points, cells=read.triangles)), dict(read.surfaces)
+    for name, members in read.surfaces.items():
+        own = np.unique(piece[members])
+        found |= {f"{name}.{n}": members[piece[members] == k] for n, k in enumerate(own, 1)} if len(own) > 1 else {}
+    return read._replace(surfaces=found)
+
+
 def _plane_mesh(read: Read) -> Mesh:
     """A mesh of the points in use, its triangles turned anticlockwise."""
-    points, triangles, sides = read.points, read.triangles, read.sides
-    for what, named in (("a triangle", triangles), *((f"side {name!r}", facets) for name, facets in sides.items())):
-        outside = named[(named < 0) | (named >= len(points))]
-        if len(outside):
-            raise MeshError(f"{what} names a node that the file does not have")
+    points, triangles = read.points, read.triangles
     used = np.unique(triangles)  # geometry points of the mesher belong to no triangle
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    for name, facets in sides.items():
-        if (number[facets] < 0).any():
-            raise MeshError(f"side {name!r} has a node that no triangle uses")
     points = points[used]
     if not np.isfinite(points).all():
         raise MeshError("a coordinate is not finite")
@@ -212,9 +226,10 @@ def _plane_mesh(read: Read) -> Mesh:
     return Mesh(
         points=points,
         cells=np.where(flipped[:, None], triangles[:, ::-1], triangles),
-        sides={name: number[facets] for name, facets in sides.items()},
+        sides={name: number[facets] for name, facets in read.sides.items()},
         surfaces=read.surfaces,
         cut=read.cut,
         shares=read.shares,
+        off=read.off,
         centres=number[read.centres][number[read.centres] >= 0],
     )

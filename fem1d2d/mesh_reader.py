@@ -15,7 +15,8 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Ints = NDArray[np.int64]
+
+#: What the surfaces of an Abaqus file list, numbers or sets of elements, by their name and the number of a face.
+Faces = dict[tuple[str, str], list[str]]
 
 #: meshio's names of the formats that are read.
 FORMATS = {".msh": "gmsh", ".inp": "abaqus"}
@@ -77,6 +81,9 @@ ABAQUS = {
     for more in ("", "H", "R", "RH", "I", "IH", "M", "MH")
 }
 
+#: The beginning of names of sets that no user has given.
+HIDDEN = "gmsh:"
+
 #: Gmsh's numbers of the kinds that are read, and their nodes.
 GMSH_NODES = {15: 1, 1: 2, 8: 3, 2: 3, 9: 6, 3: 4, 16: 8, 10: 9}
 
@@ -124,19 +131,20 @@ def contents(path: Path) -> dict[str, Any]:
 
 def _contents(path: Path) -> dict[str, Any]:
     kind = FORMATS[path.suffix.lower()]
-    materials: set[str] | None = None
-    planes: dict[str, str] = {}
+    materials, planes, faces = set[str](), dict[str, str](), Faces()
     if kind == "gmsh":
         with path.open("rb") as file:
             if file.read(11) != b"$MeshFormat":
                 raise NotRead("no Gmsh file: needed $MeshFormat on its first line")
     else:
         try:
-            materials, planes = _abaqus_materials(path)
+            materials, planes, faces = _abaqus_keywords(path)
         except UnicodeDecodeError as error:
             raise NotRead(f"needed text in UTF-8: {error.reason}") from None
-    read, lines = _by_meshio(path, kind)
+    read, lines = _by_meshio(path, kind, faces)
     cells = read.cells_dict
+    if any(len(of) and not 0 <= of.min() <= of.max() < len(read.points) for of in cells.values()):
+        raise NotRead("a cell names a node that the file does not have")
     plane = [name for name in CUTS if len(cells.get(name, ()))]
     if not plane:
         remedy = "; give the surface a physical name too" if kind == "gmsh" and lines else ""
@@ -147,8 +155,14 @@ def _contents(path: Path) -> dict[str, Any]:
     points, triangles, parts, centres = _triangles(
         np.asarray(read.points, dtype=float), {name: cells[name] for name in plane}
     )
-    groups = _surfaces(read, parts)
-    split = sorted(materials) if materials else _split(read, groups, parts, len(triangles))
+    for found in (_by_name(_faces(read, faces)), _of_nodes(read.point_sets, triangles)):
+        lines = lines | found | lines  # names that come first win
+    groups = _by_name(
+        (name, rows[members].ravel())  # numbers of triangles
+        for kind, rows in parts.items()
+        for name, members in _groups(read, kind, 2).items()
+    )
+    split = sorted(materials) if materials else _split(read, groups, len(triangles))
     why = ""
     if len(split) > 1:
         named = ", ".join(
@@ -162,7 +176,7 @@ def _contents(path: Path) -> dict[str, Any]:
     if not lines:
         if empty := ", ".join(name for name, (_, of) in read.field_data.items() if of == 1):
             raise NotRead(f"it names lines ({empty[:SAID]}), but no element belongs to one: {SAVE_ALL}")
-        raise NotRead("no named lines; give the sides physical names")
+        raise NotRead("no named lines; give the sides physical names, in Abaqus a *SURFACE or an *NSET each")
     if kind == "gmsh":
         least = _least_number(path.read_bytes())
         if least < 1:
@@ -180,8 +194,8 @@ def _contents(path: Path) -> dict[str, Any]:
     }
 
 
-def _by_meshio(path: Path, kind: str) -> tuple[Any, dict[str, Ints]]:
-    """The mesh, and its named lines."""
+def _by_meshio(path: Path, kind: str, faces: Faces) -> tuple[Any, dict[str, Ints]]:
+    """The mesh, and its named lines; the numbers that each of ``faces`` lists are a set, HIDDEN and its place."""
     import meshio
 
     words = io.StringIO()  # its readers print, and exit the interpreter on what they cannot read
@@ -190,13 +204,17 @@ def _by_meshio(path: Path, kind: str) -> tuple[Any, dict[str, Ints]]:
             warnings.simplefilter("ignore")  # numpy's, about what does not parse
             if kind == "abaqus":
                 meshio.abaqus._abaqus.abaqus_to_meshio_type.update(ABAQUS)
-            read = meshio.read(path, file_format=kind)
-            lines: dict[str, list[Ints]] = {}
-            for of, pieces in PIECES.items():
-                for name, members in _groups(read, of, 1).items():
-                    rows = read.cells_dict[of][members]
-                    lines.setdefault(name, []).extend(rows[:, list(piece)] for piece in pieces)
-            return read, {name: np.concatenate(rows) for name, rows in lines.items()}
+                text, numbers = path.read_text("utf-8"), [filter(str.isdecimal, listed) for listed in faces.values()]
+                text += "".join(f"\n*ELSET, ELSET={HIDDEN}{i}\n{', '.join(of)}" for i, of in enumerate(numbers))
+                read = meshio.abaqus._abaqus.read_buffer(io.StringIO(text))
+            else:
+                read = meshio.read(path, file_format=kind)
+            return read, _by_name(
+                (name, read.cells_dict[of][members][:, list(piece)])
+                for of, pieces in PIECES.items()
+                for name, members in _groups(read, of, 1).items()
+                for piece in pieces
+            )
     except MemoryError:
         raise
     except (Exception, SystemExit) as error:
@@ -219,8 +237,6 @@ def _triangles(points: Any, blocks: dict[str, Any]) -> tuple[Any, Ints, dict[str
         cut, new = CUTS[name]
         cells = np.asarray(cells, dtype=np.int64)
         if new:
-            if cells.min() < 0 or cells.max() >= len(points):
-                raise NotRead("a cell names a node that the file does not have")
             weights = np.array(new)[:, : cells.shape[1]]
             made = np.einsum("ij,cjk->cik", weights, points[cells])
             number = len(points) + np.arange(made.shape[0] * made.shape[1]).reshape(made.shape[:2])
@@ -233,61 +249,77 @@ def _triangles(points: Any, blocks: dict[str, Any]) -> tuple[Any, Ints, dict[str
     return points, np.concatenate(triangles), parts, np.concatenate(centres)
 
 
-def _surfaces(read: Any, parts: dict[str, Ints]) -> dict[str, Ints]:
-    """The numbers of the triangles of each named group of cells."""
+def _by_name(pairs: Iterable[tuple[str, Ints]]) -> dict[str, Ints]:
+    """All rows of each name."""
     found: dict[str, list[Ints]] = {}
-    for kind, rows in parts.items():
-        for name, members in _groups(read, kind, 2).items():
-            found.setdefault(name, []).append(rows[members].ravel())
-    return {name: np.concatenate(members) for name, members in found.items()}
+    for name, rows in pairs:
+        found.setdefault(name, []).append(rows)
+    return {name: np.concatenate(each) for name, each in found.items()}
 
 
 def _groups(read: Any, kind: str, dimension: int) -> dict[str, Ints]:
-    """Numbers of the cells of a kind that a name of the file gathers; names without cells are left out."""
-    groups: dict[str, Any] = {}
-    for name, blocks in read.cell_sets_dict.items():
-        if kind in blocks and not name.startswith("gmsh:"):
-            groups[name] = blocks[kind]
-    if not groups and "gmsh:physical" in read.cell_data_dict and kind in read.cells_dict:
-        tags = read.cell_data_dict["gmsh:physical"][kind]
-        for name, (tag, of) in read.field_data.items():
-            if of == dimension:
-                groups[name] = np.flatnonzero(tags == tag)
+    """Numbers of the cells of a kind that a name of the file gathers; names without cells are left out.
+
+    The name of a physical group of Gmsh without one is its number; without any group the geometry's numbers are names.
+    """
+    groups = {name: of[kind] for name, of in read.cell_sets_dict.items() if kind in of and not name.startswith(HIDDEN)}
+    numbers = read.cell_data_dict.get("gmsh:physical", {})
+    if not read.field_data and not any(map(np.any, numbers.values())):
+        numbers = read.cell_data_dict.get("gmsh:geometrical", {})
+    tags = numbers.get(kind, np.empty(0, dtype=np.int64))
+    names = {name: tag for name, (tag, of) in read.field_data.items() if of == dimension}
+    names |= {str(tag): tag for tag in np.unique(tags[tags != 0]).tolist() if tag not in names.values()}
+    groups = {name: np.flatnonzero(tags == tag) for name, tag in names.items()} | groups
     return {name: np.asarray(members, dtype=np.int64) for name, members in groups.items() if len(members)}
 
 
-def _split(read: Any, groups: dict[str, Ints], parts: dict[str, Ints], count: int) -> list[str]:
+def _faces(read: Any, faces: Faces) -> Iterator[tuple[str, Ints]]:
+    """Edges of the surfaces of an Abaqus file: faces 1, 2, .. of its plane elements, or its line elements."""
+    sets = {name.upper(): of for name, of in read.cell_sets_dict.items()}
+    for i, ((surface, face), listed) in enumerate(faces.items()):
+        for kinds in {name.upper(): sets.get(name.upper(), {}) for name in (f"{HIDDEN}{i}", *listed)}.values():
+            for kind, members in kinds.items():
+                corners, first = 3 if kind.startswith("triangle") else 4, int(face) if face.isdecimal() else 0
+                path = [first - 1, *[corners + first - 1] * (kind in ("triangle6", "quad8")), first % corners]
+                for pair in PIECES.get(kind) or pairwise(path if 0 < first <= corners else ()):
+                    yield surface, read.cells_dict[kind][members][:, list(pair)]
+
+
+def _of_nodes(sets: dict[str, Ints], triangles: Ints) -> dict[str, Ints]:
+    """The edges of the outline between the nodes of each set all of whose nodes lie on it."""
+    if not sets:
+        return {}
+    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+    _, first, count = np.unique(ends @ [ends.max() + 1, 1], return_index=True, return_counts=True)
+    outline = ends[first[count == 1]]
+    edges = {name: outline[np.isin(outline, of).all(axis=1)] for name, of in sets.items() if np.isin(of, outline).all()}
+    return {name: of for name, of in edges.items() if len(of)}
+
+
+def _split(read: Any, groups: dict[str, Ints], count: int) -> list[str]:
     """Names of the groups that share the triangles; none if one of them holds all.
 
     Named surfaces of a Gmsh file are materials.  Element sets of an Abaqus file may also be neighbours of a side: they
     count as materials only if each triangle lies in one of them.
     """
-    covered = np.zeros(count, dtype=bool)
-    for members in groups.values():
-        holds = np.zeros(count, dtype=bool)
-        holds[members] = True
-        covered |= holds
-        if holds.all():
-            return []
-    names = sorted(groups)
-    physical = read.cell_data_dict.get("gmsh:physical", {})
-    if names and physical:
-        others = {tag for kind, rows in parts.items() for tag in physical[kind][~covered[rows[:, 0]]].tolist()}
-        names += [f"physical surface {tag}" for tag in sorted(others - {0})]
-    elif not covered.all():
+    each = [np.unique(members) for members in groups.values()]
+    if any(len(members) == count for members in each):
         return []
-    return names
+    covered = len(np.unique(np.concatenate([[-1], *each]))) > count
+    of_gmsh = any(name in groups for name, (_, of) in read.field_data.items() if of == 2)
+    return sorted(groups) if of_gmsh or (not read.cell_data_dict and covered) else []
 
 
-def _abaqus_materials(path: Path) -> tuple[set[str], dict[str, str]]:
-    """Materials of the sections of an Abaqus file, and an element type of each plane that its elements name.
+def _abaqus_keywords(path: Path) -> tuple[set[str], dict[str, str], Faces]:
+    """Materials of the sections of an Abaqus file, an element type of each plane of its elements, and its surfaces.
 
     Refuses files that meshio would read from elsewhere or mix up, and elements of another kind of plane.
     """
     materials, planes, blocks, lists, keyword = set(), dict[str, str](), [], [], ""
+    faces, surface = Faces(), ""
     with path.open(encoding="utf-8") as file:
         for line in file:
-            if line.startswith("**") or (keyword != "ELSET" and line.lstrip()[:1].isdigit()):
+            if line.startswith("**") or (keyword not in ("ELSET", "SURFACE") and line.lstrip()[:1].isdigit()):
                 continue  # a comment; a node or an element, as almost all lines are
             head, *options = line.split(",")
             word = "".join(head.split()).replace("*", "").upper()
@@ -297,6 +329,8 @@ def _abaqus_materials(path: Path) -> tuple[set[str], dict[str, str]]:
             if not line.startswith("*"):
                 if keyword == "ELSET" and line.strip(" \t\r\n,") and not head.strip().isnumeric():
                     raise NotRead("an *ELSET lists names of other sets: needed numbers of elements")
+                if keyword == "SURFACE" and surface and head.strip():
+                    faces.setdefault((surface, "".join(options[:1]).strip()[1:]), []).append(head.strip())
                 continue
             keyword = word
             if keyword in SECTIONS and given.get("MATERIAL"):
@@ -308,14 +342,16 @@ def _abaqus_materials(path: Path) -> tuple[set[str], dict[str, str]]:
                     raise NotRead(f"its elements {of[:SAID]} are axisymmetric: needed those of plane strain or stress")
                 if plane := next((word for start, word in ABAQUS_PLANES.items() if word and of.startswith(start)), ""):
                     planes.setdefault(plane, of)
-            elif keyword == "ELSET":
-                lists.append(given.get("ELSET"))
+            elif keyword in ("ELSET", "NSET"):
+                lists.append((keyword, given.get(keyword)))
+            elif keyword == "SURFACE":
+                surface = given.get("NAME", "") if given.get("TYPE", "ELEMENT").upper() == "ELEMENT" else ""
     named = [name for name in blocks if name]
     if len(set(named)) < len(named) or None in blocks[: len(named)]:  # meshio counts the sets for the blocks
         raise NotRead("needed a different ELSET for each *ELEMENT, or for none of them")
     if len(set(lists)) < len(lists):  # meshio keeps the last
-        raise NotRead("needed one *ELSET for each name")
-    return materials, planes
+        raise NotRead("needed one *ELSET or *NSET for each name")
+    return materials, planes, faces
 
 
 def _least_number(content: bytes) -> int:

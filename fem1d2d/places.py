@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem1d2d.element import gradients, lacks
-from fem1d2d.mesh import Floats, Ints, Mesh, MeshError
+from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, place_of
 from fem1d2d.trace import SAME, extent
 
 
@@ -66,12 +66,12 @@ def place(mesh: Mesh, point: Floats, members: Ints | None = None) -> Place:
     if distance <= slack:
         return Place(nodes=np.array([nearest]), weights=np.ones(1), cells=members[(cells == nearest).any(axis=1)])
     if why := lacks(mesh, "values"):
-        raise MeshError(f"{why}: needed a node, the nearest one is {_show(points[nearest])}")
+        raise MeshError(f"{why}: needed a node, the nearest one is {place_of(points[nearest])}")
     slopes = gradients(mesh)[members]
     hats = 1 / cells.shape[1] + ((point - points[cells].mean(axis=1))[:, None] * slopes).sum(axis=2)
     holds = (hats >= -slack * np.linalg.norm(slopes, axis=2)).all(axis=1)
     if not holds.any():
-        raise MeshError(f"{_show(point)} lies outside the body, whose nearest node is {_show(points[nearest])}")
+        raise MeshError(f"{place_of(point)} lies outside the body, whose nearest node is {place_of(points[nearest])}")
     first = int(np.argmax(holds))
     return Place(nodes=cells[first], weights=hats[first], cells=members[holds])
 
@@ -89,7 +89,9 @@ def node_at(mesh: Mesh, point: Floats, members: Ints | None = None) -> int:
     corners = points[cells[(cells == node).any(axis=1)]]
     longest = max(float(np.linalg.norm(np.roll(corners, i, axis=1) - corners, axis=2).max()) for i in range(1, 3))
     if not distance <= longest / 2 + SAME * extent(mesh):
-        raise MeshError(f"no node lies within half an edge of {_show(point)}, the nearest one is {_show(points[node])}")
+        raise MeshError(
+            f"no node lies within half an edge of {place_of(point)}, the nearest one is {place_of(points[node])}"
+        )
     return node
 
 
@@ -108,7 +110,3 @@ def _nearest(points: Floats, cells: Ints, point: Floats) -> tuple[int, float]:
     distances = np.linalg.norm(points[nodes] - point, axis=1)
     found = int(np.argmin(distances))
     return int(nodes[found]), float(distances[found])
-
-
-def _show(point: Floats) -> str:
-    return f"({', '.join(f'{float(c):g}' for c in point)})"

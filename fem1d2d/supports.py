@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from fem1d2d.mesh import Bools, Cells, Floats, Mesh, MeshError, edges, undirected
+from fem1d2d.mesh import Bools, Cells, Floats, Mesh, MeshError, edges, place_of, undirected
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,10 +58,9 @@ def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Support
                 continue
             clash = nodes[held[nodes, p] & (values[nodes, p] != value)]
             if len(clash):
-                where = ", ".join(f"{c:g}" for c in mesh.points[clash[0]].astype(float))
                 raise MeshError(
-                    f"side {name!r} prescribes {value:g} at ({where}) where another side prescribes "
-                    f"{values[clash[0], p]:g} for the same component"
+                    f"side {name!r} prescribes {value:g} at {place_of(mesh.points[clash[0]])} where another side"
+                    f" prescribes {values[clash[0], p]:g} for the same component"
                 )
             held[nodes, p] = True
             values[nodes, p] = value

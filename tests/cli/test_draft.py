@@ -262,15 +262,13 @@ def test_a_gap_is_closed_by_the_displacement_that_is_proposed(tmp_path):
 
 def test_a_file_without_names_is_refused_in_one_line(call, tmp_path):
     path = gmsh(tmp_path / "none.msh", two(((), ())), ["lower", "upper"])
-    assert call("draft", path).complaint == f"ndtheory: {path}: no named lines; give the sides physical names"
+    assert call("draft", path).complaint.startswith(f"ndtheory: {path}: no named lines; give the sides physical names")
 
 
-def test_a_surface_that_covers_two_pieces_is_refused_in_one_line(call, tmp_path):
-    path = gmsh(tmp_path / "both.msh", two(), ["all", "all"])
-    assert call("draft", path).complaint == (
-        f"ndtheory: {path}: needed a physical surface (in Abaqus an element set) for each body: 2 pieces of"
-        " it share no edge, and surface 'all' covers several"
-    )
+def test_the_pieces_of_a_surface_are_bodies(tmp_path):
+    found = draft(gmsh(tmp_path / "both.msh", two(), ["all", "all"]))
+    assert [body.group for body in found.bodies] == [("all.1",), ("all.2",)]
+    assert finished(found, tmp_path).contact.force["normal"] == pytest.approx(525, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["a.b", "Fläche β", "a # b", "[x]", "1 = 2", "'"])

@@ -247,11 +247,6 @@ def test_points_off_the_plane_are_refused(tmp_path):
     refused(path, "the points do not lie in a plane z = constant")
 
 
-def test_lines_without_physical_names_are_refused(tmp_path):
-    more = [("line", np.array([[0, 1]]))]
-    refused(write(tmp_path / "body.msh", SQUARE, TRIANGLES, more=more), "no named lines")
-
-
 def test_a_name_of_a_surface_is_no_side(tmp_path):
     tags = [np.array([1, 1])]
     mesh = meshio.Mesh(
@@ -262,12 +257,6 @@ def test_a_name_of_a_surface_is_no_side(tmp_path):
     )
     meshio.write(tmp_path / "body.msh", mesh, file_format="gmsh22", binary=False)
     refused(tmp_path / "body.msh", "no named lines")
-
-
-def test_a_side_with_a_node_of_no_triangle_is_refused_by_its_name(tmp_path):
-    points = np.concatenate([SQUARE, [[2.0, 0.0, 0.0]]])
-    path = write(tmp_path / "body.msh", points, TRIANGLES, {"bottom": [[0, 1]], "loose": [[1, 4]]})
-    refused(path, "side 'loose' has a node that no triangle uses")
 
 
 def test_a_flat_triangle_is_refused(tmp_path):
@@ -298,11 +287,6 @@ def written(path, *elements):
     [
         ([LINE, LINE, *CELLS], r"side 'bottom' lists the facet from \(0, 0\) to \(1, 0\) 2 times: once is needed"),
         ([LINE, "1 2 1 1 2 1", *CELLS], "2 times"),
-        (
-            ["1 2 1 1 1 3", *CELLS],
-            r"side 'bottom' has a facet from \(0, 0\) to \(1, 1\), which is none of the boundary",
-        ),
-        (["1 2 1 1 2 4", *CELLS], "none of the boundary"),
         ([LINE, *CELLS, *CELLS], "cells 0 and 2 have the same nodes: each cell is needed once"),
         ([LINE, *CELLS, "2 2 9 1 3 2 1"], "cells 0 and 2 have the same nodes"),
         ([LINE, *CELLS, "2 2 9 1 1 2 4"], r"cells \d and 2 lie on the same side of the facet"),

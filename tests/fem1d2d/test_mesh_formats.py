@@ -40,7 +40,7 @@ def surfaces(path, named, tags, version="2.2"):
 
 @pytest.mark.parametrize(
     ("named", "tags", "found"),
-    [({"rubber": 9, "steel": 8}, (9, 8), '"rubber", "steel"'), ({"steel": 9}, (9, 8), '"steel", "physical surface 8"')],
+    [({"rubber": 9, "steel": 8}, (9, 8), '"rubber", "steel"'), ({"steel": 9}, (9, 8), '"8", "steel"')],
 )
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
 def test_two_named_surfaces_are_two_materials(tmp_path, version, named, tags, found):
@@ -124,7 +124,8 @@ def test_element_sets_that_leave_triangles_out_or_hold_all_are_no_materials(tmp_
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("*ELSET, ELSET=top\n2\n*ELSET, ELSET=top\n3\n", "needed one \\*ELSET for each name"),
+        ("*ELSET, ELSET=top\n2\n*ELSET, ELSET=top\n3\n", "needed one \\*ELSET or \\*NSET for each name"),
+        ("*NSET, NSET=top\n2\n*NSET, NSET=top\n3\n", "needed one \\*ELSET or \\*NSET for each name"),
         ("*ELSET, ELSET=all\nbottom\n", "an \\*ELSET lists names of other sets"),
         ("*ELSET, ELSET=all\n1, 2\nbottom,\n", "an \\*ELSET lists names of other sets"),
         ("*ELEMENT, TYPE=T3D2, ELSET=edge\n9, 2, 3\n", "needed a different ELSET for each \\*ELEMENT"),

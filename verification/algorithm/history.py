@@ -282,11 +282,12 @@ class History(Document):
     def warnings(self) -> list[str]:
         """Facts to know before trusting the numbers.
 
-        Of the first increment, and the worst checks.
+        Of the increment in which most nodes touch, and the worst checks.
         """
         of_checks = ("largest_strain", "penetration_outside")
         worst = [max(self.increments, key=lambda one: getattr(one.result.checks, name) or 0.0) for name in of_checks]
-        lines = dict.fromkeys(line for each in (self.increments[0], *worst) for line in each.result.warnings)
+        widest = min(self.increments, key=lambda one: one.contact.pattern["open"])
+        lines = dict.fromkeys(line for each in (widest, *worst) for line in each.result.warnings)
         length = self.units["length"]
         apart = [line for each in self.increments for line in each.contact.warnings(length)]  # most part, or meet later
         nearest = min(self.increments, key=lambda one: float(one.contact.gap.min()))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d import interval, mortar, rectangle_points, trapezoid
+from fem1d2d import interval, rectangle_points, trapezoid
 from fem1d2d.element import lacks
 from fem1d2d.mesh import Bools
 from fem1d2d.proofs import exact
@@ -25,6 +25,7 @@ from fem1d2d.proofs.exact import Shapes
 from verification.interface.body import Body, in_frames, material_of
 from verification.interface.interface import Grid
 from verification.interface.join import joined
+from verification.interface.joining import transferred
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
@@ -141,10 +142,8 @@ class ExactInterface:
         self.grid = Grid(x=x, weights=trapezoid(x), dimension=pair.interface.contact.dimension)
         self.other, self.exact_transfer = self.grid, None
         if not one_grid:
-            x = neumann.copy()
-            x[0], x[-1] = min(x[0], contact[0]), max(x[-1], contact[-1])
-            self.exact_transfer = mortar(contact, x)
-            self.other = Grid(x=x, weights=self.exact_transfer.T @ self.grid.weights)
+            x, self.exact_transfer, weights = transferred(contact, neumann)
+            self.other = Grid(x=x, weights=weights)
         normals = (exact_normals(grid.normals) for grid in (contact_grid, neumann_grid))
         self.join = pair.interface.holding(joined(self.exact_transfer, *normals))
 

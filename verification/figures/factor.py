@@ -39,10 +39,7 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
             best = evaluate_energy(energy)
             if best.theta_proved is not None and best.factor_proved is not None:
                 ax.plot([best.theta_proved], [best.factor_proved.value], "o", color=colour, markersize=5)
-        ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
-        ax.set(xlim=(0, 1), ylim=(0, 1.5), xlabel=THETA, ylabel="factor of one step")
-        ax.set_title("How much one step changes the distance of two forces")
-        legend_beside(ax)
+        _finish(ax, "How much one step changes the distance of two forces")
     return figure
 
 
@@ -67,11 +64,14 @@ def draw_proved(found: Comparison) -> Figure:
             ax.plot(
                 [float(found.run.theta)], [found.run.observed_rate.value], "o", color="0.1", label="rate of the run"
             )
-        ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
-        ax.set(xlim=(0, 1), ylim=(0, 1.5), xlabel=THETA, ylabel="factor of one step")
-        ax.set_title(f"{plain(found.run.pair.title)}: k = {float(found.run.pair.friction):g}")
-        legend_beside(ax)
+        _finish(ax, f"{plain(found.run.pair.title)}: k = {float(found.run.pair.friction):g}")
     return figure
+
+
+def _finish(ax: Any, title: str) -> None:
+    ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
+    ax.set(xlim=(0, 1), ylim=(0, 1.5), xlabel=THETA, ylabel="factor of one step", title=title)
+    legend_beside(ax)
 
 
 @draw.register

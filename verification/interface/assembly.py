@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -28,12 +28,12 @@ from fem1d2d import (
     supports,
 )
 from fem1d2d.element import element_of
-from fem1d2d.mesh import Floats, Ints, Split, shared
+from fem1d2d.mesh import Floats, Ints, Split, place_of, shared
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
 from verification.interface.body import Body, Name, in_frames, material_of, turning
 from verification.interface.interface import Interface, Law, Nodes
-from verification.interface.joining import join, width_at
+from verification.interface.joining import held_normals, join, width_at
 from verification.interface.several import join_lines, together
 from verification.problem.specification import Problem
 from verification.problem.specs import MOST_CELLS, BodySpec
@@ -204,6 +204,11 @@ class TwoBodies(Value):
         """The bodies that are not rigid."""
         return [body for body in (self.body1, self.body2) if body is not None]
 
+    def each(self, moved: Sequence[Floats | None]) -> list[tuple[Body, Floats]]:
+        """Return the bodies that are not rigid, with the values of both that belong to them."""
+        both = zip((self.body1, self.body2), moved, strict=True)
+        return [(body, u) for body, u in both if body is not None and u is not None]
+
     def under(self, problem: Problem, slipped: Floats | None) -> TwoBodies:
         """Return the bodies under the loads of another problem, which has no other difference, after they have slipped.
 
@@ -245,7 +250,7 @@ class TwoBodies(Value):
     @property
     def warnings(self) -> list[str]:
         """Facts that a user should know before trusting the numbers."""
-        return warnings_of(self.interface, self.friction, self.elastic) + path_warnings(self.problem)
+        return warnings_of(self.interface, self.elastic) + path_warnings(self.problem)
 
 
 def reasons_outside(interface: Interface, friction: Fraction, free: Mapping[int, Nodes]) -> list[str]:
@@ -281,7 +286,7 @@ def pressure_errors(problem: Problem, bodies: list[Body]) -> Iterator[str]:
                 yield f"nodal pressures off by about {off:.2g} %{more} at nu = {ratio:g} of {own}, {less:.1g} % {words}"
 
 
-def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) -> list[str]:
+def warnings_of(interface: Interface, bodies: list[Body]) -> list[str]:
     found = []
     near = nearly_incompressible([body for body in bodies if element_of(body.mesh).locks(body.mesh)])
     if near:
@@ -311,8 +316,6 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
             " the edges opposite, which resolves the contact of curved bodies badly: give the coarser body the"
             " Neumann problem (iteration.neumann_body)"
         )
-    if friction and interface.law is not None:
-        found += interface.law.warnings(interface)
     return found
 
 
@@ -389,15 +392,15 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         node, an unreadable mesh.
     """
     meshes = [None if spec.rigid else _mesh(problem, spec, name) for name, spec in _specs(problem)]
+    known: list[Supports | None] = []
     for (name, _), mesh in zip(_specs(problem), meshes, strict=True):
         _check_extents(problem, name, mesh)
-    known = [
-        None if mesh is None else _supports(problem, name, mesh)
-        for (name, _), mesh in zip(_specs(problem), meshes, strict=True)
-    ]
+        known.append(None if mesh is None else _supports(problem, name, mesh))
     nodes, interface = (join_lines if problem.several else join)(problem, meshes, known, law)
     if dense and interface.contact.n > MOST_CONTACT_NODES:
-        needed = f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}"
+        needed = (
+            f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}; `solve` takes more"
+        )
         raise TooManyContactNodes(problem.source, "contact", None, needed)
     body1, body2 = (
         None if mesh is None or held is None else _body(problem, name, mesh, held, own, interface)
@@ -478,11 +481,10 @@ def _mesh(problem: Problem, spec: BodySpec, name: str) -> Mesh:
         if len(mesh.cells) > 2 * MOST_CELLS:
             raise refuse(f"needed at most {2 * MOST_CELLS} triangles, these are {len(mesh.cells)}")
         mesh = _with_parts(problem, spec, name, mesh)
-        for key, sides in (("fixed", spec.fixed), ("prescribed", spec.prescribed), ("traction", spec.traction)):
-            for side in sides:
+        for key in ("fixed", "prescribed", "traction"):
+            for side in getattr(spec, key):
                 if side not in mesh.sides:
-                    needed = "unknown side; the mesh file names " + short(", ".join(mesh.sides))
-                    raise problem.refuse(f"{name}.{key}", side, needed)
+                    raise problem.refuse(f"{name}.{key}", side, f"unknown side; {mesh.lacks(side)}")
         return mesh
     assert spec.x is not None
     assert spec.cells is not None
@@ -510,9 +512,7 @@ def _with_parts(problem: Problem, spec: BodySpec, name: str, mesh: Mesh) -> Mesh
     for key, part in spec.parts.items():
         refuse = lambda needed, key=key: problem.refuse(f"{name}.parts.{key}", None, needed)
         if key in mesh.sides or part.side not in mesh.sides:
-            raise refuse(
-                f"needed a part of a side, with a name that no side has; sides: {short(', '.join(mesh.sides))}"
-            )
+            raise refuse(f"needed a part of a side, with a name that no side has; {mesh.lacks(part.side)}")
         edges, slack = mesh.sides[part.side], SAME * extent(mesh)
         along = mesh.points[edges, "xy".index(part.axis)].astype(float)
         low, high = map(float, part.ends)
@@ -546,7 +546,7 @@ def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes
     """Refuse supports that hold more of a contact node than its tangential component."""
     if normals is None:
         normals = np.tile(np.eye(mesh.dimension)[-1], (len(nodes), 1))
-    wrong = (known.held[nodes] & (normals != 0)).any(axis=1)
+    wrong = held_normals(known, nodes, normals)
     if not wrong.any():
         return
     j = int(np.argmax(wrong))
@@ -557,10 +557,13 @@ def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes
         if nodes[j] in mesh.sides[prefix + side]
         and any(v is not None and n for v, n in zip(values, normals[j], strict=True))
     )
-    where = ", ".join(f"{c:g}" for c in mesh.points[nodes[j]].astype(float))
     key, value = ("fixed", list(spec.fixed)) if holds in spec.fixed else (f"prescribed.{holds}", None)
-    needed = f"needed the normal component of every contact node free, side {holds!r} holds the one at ({where})"
-    raise problem.refuse(f"{own}.{key}", value, needed)
+    end = "a part of the side" if problem.named else "an interval"
+    remedy = f"leave it free, or let Gamma_c end before it, by {end}"
+    if wrong.all() and not problem.several:
+        remedy = f'a body held all along Gamma_c is an obstacle: {own}.shape = "rigid" in place of its mesh and moduli'
+    needed = f"needed the normal component of every contact node free, side {holds!r} holds the one at"
+    raise problem.refuse(f"{own}.{key}", value, f"{needed} {place_of(mesh.points[nodes[j]])}; {remedy}")
 
 
 def _load(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, interface: Interface) -> Floats:
@@ -579,7 +582,7 @@ def _load(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
             for line, x, ends in _lines_on(nodes, interface, own=int(name[-1]) == problem.contact_body):
                 loaded -= _covered(mesh, facets, line, x if problem.named else None, ends)
             if any(force) and loaded.max() <= SAME * extent(mesh):
-                needed = "Gamma_c covers this side: a force there is lost"
+                needed = "Gamma_c covers this side: a force there is lost; point_load gives one to its nodes"
                 raise problem.refuse(f"{own}.traction.{side}", list(force), needed)
             load += loaded[:, None] * plain(force)
         for point, force in spec.point_load.items():

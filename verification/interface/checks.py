@@ -205,13 +205,12 @@ def _first_largest(values: Floats) -> int:
 def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
     """Return the largest absolute principal strain, and the centre of its element."""
     largest, at = 0.0, None
-    for body, u in zip((bodies.body1, bodies.body2), moved, strict=True):
-        if body is not None and u is not None:
-            strains = largest_strains(body.mesh, u, body.material)
-            if strains.max() > largest * (1 + TIE):
-                centre = body.mesh.points[body.mesh.cells[_first_largest(strains)]].mean(axis=0)
-                at = tuple(map(float, centre))
-            largest = max(largest, float(strains.max()))
+    for body, u in bodies.each(moved):
+        strains = largest_strains(body.mesh, u, body.material)
+        if strains.max() > largest * (1 + TIE):
+            centre = body.mesh.points[body.mesh.cells[_first_largest(strains)]].mean(axis=0)
+            at = tuple(map(float, centre))
+        largest = max(largest, float(strains.max()))
     return largest, at
 
 
@@ -256,12 +255,12 @@ def _penetration(bodies: TwoBodies, moved: Displacements, beyond: Ints) -> tuple
     gap, named = float(problem.contact.gap), problem.named
     lift = gap * mean / np.linalg.norm(mean) if gap else np.zeros(2)  # of body 2
     surfaces: list[list[_Surface]] = [[], []]
-    for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), moved, strict=True)):
-        if body is not None and u is not None:
-            lines = [(nodes, x if named else None, its) for nodes, x, its in bodies.lines_on(body)]
-            members = [body.mesh.surfaces[f"body{j}"] for j in problem.numbers(i + 1)] if problem.several else []
-            each = [body.mesh.cells[cells] for cells in members] or [body.mesh.cells]
-            surfaces[i] = [_Surface.of(body.mesh, u + i * lift, lines, cells) for cells in each]
+    for body, u in bodies.each(moved):
+        i = int(body.name[-1]) - 1
+        lines = [(nodes, x if named else None, its) for nodes, x, its in bodies.lines_on(body)]
+        members = [body.mesh.surfaces[f"body{j}"] for j in problem.numbers(i + 1)] if problem.several else []
+        each = [body.mesh.cells[cells] for cells in members] or [body.mesh.cells]
+        surfaces[i] = [_Surface.of(body.mesh, u + i * lift, lines, cells) for cells in each]
     if not surfaces[0]:
         assert bodies.body2 is not None
         surfaces[0] = [_obstacle(problem.body1, bodies.body2, surfaces[1][0], grid, 0 * lift, upper=True)]

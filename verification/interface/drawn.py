@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d import Line, Mesh, MeshError, mesh_files, pieces
-from fem1d2d.mesh import Cells, Floats, Ints, measures, undirected
+from fem1d2d.mesh import Cells, Floats, Ints, measures, undirected, where
 from fem1d2d.trace import SAME
 from ndtheory.keys import Part, key, says
 from verification.interface.joining import MOST_OVERLAP, facing_parts, width_at
@@ -65,7 +65,7 @@ class Drawn(Part):
         bare = replace(self.mesh, sides={"": self.mesh.boundary[~np.isin(outer, named)]})
         found = {side: Line.parts(self.mesh, side, left=left, away=away) for side in self.mesh.sides}
         for line in Line.parts(bare, "", left=left, away=away):
-            found["from ({:g}, {:g}) to ({:g}, {:g})".format(*line.points[[0, -1]].ravel())] = [line]
+            found[where(line.points, np.array([0, -1]))] = [line]
         return found
 
 
@@ -80,12 +80,12 @@ def bodies_of(path: Path, *, one: bool) -> list[Drawn]:
     try:
         read = mesh_files.contents(path)
         piece = pieces(Cells(points=read.points, cells=read.triangles)) * (not one)
+        read = read if one else mesh_files.with_pieces(read)
         groups = [_surfaces(read.surfaces, piece == k) for k in range(int(piece.max()) + 1)]
         if (several := len(groups) > 1) and not all(whole or parts for whole, parts in groups):
-            wide = [name for name, members in read.surfaces.items() if np.ptp(piece[members])]
-            why = f"surface {wide[0]!r} covers several" if wide else "some lie in no named surface"
             needed = "needed a physical surface (in Abaqus an element set) for each body"
-            raise MeshError(f"{needed}: {len(groups)} pieces of it share no edge, and {why}")
+            why = "pieces of it share no edge, and some lie in no named surface"
+            raise MeshError(f"{needed}: {len(groups)} {why}")
         if read.split and not several and not groups[0][1]:
             raise MeshError(read.split)
         bodies = [(parts or whole if several else parts, parts) for whole, parts in groups]

@@ -82,13 +82,17 @@ class Nonlocal(Law):
             (hat(x - image, self.radius) for image in interface.reflected(y, self.radius)), hat(x - y, self.radius)
         )
 
-    def warnings(self, interface: Interface) -> list[str]:
-        x, weights, kernel = interface.neumann.x, interface.contact.weights, self.operator(interface)
-        r, width, length = self.radius, float(np.diff(x).max()), float(np.ptp(interface.contact.x))
-        # an even pressure as the kernel averages it, and the force that a body then carries while it slides, as a part
-        # of k times the normal force
-        even = kernel @ interface.neumann.weights
-        share = float(weights @ even / weights.sum())
+    def warnings_after(self, interface: Interface, k: float, pressure: Floats, bound: Floats) -> list[str]:
+        closed = pressure > LITTLE * pressure.max(initial=0.0)
+        closed = closed if closed.any() else ~closed
+        weights = interface.contact.weights * closed
+        # an even pressure there as the kernel averages it, and the force that a body then carries while it slides, as
+        # a part of k times the normal force
+        pressed = interface.join.values_back(weights)
+        even = (self.operator(interface) @ pressed)[closed]
+        length, inside = float(weights.sum()), pressed > 0
+        share = float(weights[closed] @ even) / length
+        r, width = self.radius, float(np.diff(interface.neumann.x)[inside[1:] | inside[:-1]].max())
         if r < width * (1 - 1e-9):
             effect = f"multiplies friction by about width/radius = {width / r:.3g}"
             if not interface.one_grid:
@@ -97,9 +101,9 @@ class Nonlocal(Law):
             return [f"{below}: the kernel sees single nodes and {effect}"]
         if share < 1 - SHARE:
             return [
-                f"contact.radius = {r:g} is not small against the length {length:g} of Gamma_c: the kernel is cut off"
-                f" at the ends, and a body that slides under an even pressure carries {100 * share:.0f} % of k times"
-                " the normal force"
+                f"contact.radius = {r:g} is not small against the length {length:g} of the closed part of Gamma_c: the"
+                " kernel is cut off at the ends, and a body that slides under an even pressure carries"
+                f" {100 * share:.0f} % of k times the normal force"
             ]
         if share > 1 + SHARE:
             return [

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d import trapezoid
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Floats, place_of
 from fem1d2d.trace import SAME
 from ndtheory.keys import Part, key
 from verification.interface.join import ONE_GRID, Held, Join, joined
@@ -85,7 +85,7 @@ class Grid(Value):
         """Return the place of a node, for a message."""
         if self.normals is None or self.points is None:
             return f"x = {self.x[j]:g}"
-        return f"({self.points[j, 0]:g}, {self.points[j, 1]:g})"
+        return place_of(self.points[j])
 
     @property
     def summary(self) -> str:
@@ -192,10 +192,6 @@ class Law(ABC):
         With ``of_contact`` it takes those on the contact grid, shape (n_c, n_c).  Forces are per unit thickness,
         compressive ones positive.
         """
-
-    def warnings(self, interface: Interface) -> list[str]:
-        """Return what a user should know before trusting the numbers of this law on these grids."""
-        return []
 
     def warnings_after(self, interface: Interface, k: float, pressure: Floats, bound: Floats) -> list[str]:
         """Return what a solution shows of this law: its pressure and friction bound at the contact nodes."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem1d2d import Line, Mesh, MeshError, Supports, facing, mortar, surface, trapezoid
-from fem1d2d.mesh import Floats, Ints
+from fem1d2d.mesh import Floats, Ints, place_of
 from fem1d2d.trace import SAME, extent
 from verification.interface.interface import Grid, Interface, Law, Support
 from verification.problem.specification import Problem
@@ -33,6 +36,11 @@ UPPER = (True, False)
 
 #: Within this part of the smaller extent of the bodies a second part of a side that faces the other body could touch.
 REACH = 0.1
+
+#: How bodies that lie in each other come apart, and how sides that face each other in any direction are found.
+APART = "; draw them apart, or give contact.gap (of two bodies)"
+CUT = "; contact.surface instead cuts whole sides to whole edges"
+BY_NAME = "contact.surface names sides that face each other in any direction"
 
 Ends = tuple[float, float]
 
@@ -126,7 +134,7 @@ def _along_x(problem: Problem, meshes: list[Mesh | None], known: list[Supports |
         low, high = (np.broadcast_to(level, at.shape)[j] for level in levels)
         needed = (
             f"the bodies lie in each other: {where}body 1 ends at {axis} = {low:g}, body 2 begins at {axis} ="
-            f" {high:g}; needed an overlap of at most {100 * MOST_OVERLAP:g} % of the height {height:g}"
+            f" {high:g}; needed an overlap of at most {100 * MOST_OVERLAP:g} % of the height {height:g}{APART}"
         )
         raise problem.refuse(f"body2.{axis}", None, needed)
     return nodes, grids, P, np.broadcast_to(gap, at.shape).copy()
@@ -138,6 +146,11 @@ def _transfer(problem: Problem, contact: Floats, neumann: Floats) -> tuple[Float
     if most > MOST_NODES_APART:
         needed = f"needed at most {MOST_NODES_APART} contact nodes on grids that differ, these are {most}"
         raise problem.refuse("contact", None, needed)
+    return transferred(contact, neumann)
+
+
+def transferred(contact: Any, neumann: Any) -> tuple[Any, Any, Any]:
+    """Return the positions of the Neumann grid, P, and its weights, in numbers of any kind."""
     x = neumann.copy()
     x[0], x[-1] = min(x[0], contact[0]), max(x[-1], contact[-1])  # ends that differ by rounding
     P = mortar(contact, x)
@@ -155,7 +168,7 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
     drawn = []
     for i, (side, mesh, spec) in enumerate(zip(sides, meshes, (problem.body1, problem.body2), strict=True)):
         if mesh is not None and side not in mesh.sides:
-            raise refuse(f"body {i + 1} has no side {side!r}; its sides: {', '.join(mesh.sides)}")
+            raise refuse(f"body {i + 1} has no side {side!r}; {mesh.lacks(side)}")
         drawn.append(np.array(spec.face) if mesh is None else mesh.points[np.unique(mesh.sides[side])].astype(float))
     for i, (side, mesh, held, away) in enumerate(zip(sides, meshes, known, drawn[::-1], strict=True)):
         if mesh is None:  # the body lies on either side of the line, to be seen from the other body
@@ -169,40 +182,55 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
         line, own, other = facing_parts(parts[contact], parts[1 - contact], sides[contact], REACH * height)
     except MeshError as error:
         needed = f"side {sides[1 - contact]!r} of body {2 - contact} {error}, of {sides[contact]!r}"
-        raise refuse(
-            f"{needed}: Gamma_c is the one part of the contact body's side that it faces; name other sides or parts"
-        ) from None
+        remedy = "name other sides or parts"
+        if meshes[1 - contact] is not None:
+            with suppress(MeshError):
+                facing_parts(parts[1 - contact], parts[contact], sides[1 - contact], REACH * height)
+                remedy = f"it is found with exchanged roles: let body {contact + 1} have the Neumann problem"
+        raise refuse(f"{needed}: Gamma_c is the one part of the contact body's side that it faces; {remedy}") from None
+    line = _between_supports(line, other, known, contact)
     lines = [own, other] if contact == 0 else [other, own]
     seen = line.seen_from(other)
     within, kept = line.slack, seen.reaches
     s, nodes = seen.s[kept], [line.nodes, other.nodes[kept]]
     P = None
-    normals = line.normals_at(s)
+    normals, grid_of = line.normals_at(s), lambda of: replace(Grid.on(of.s), points=of.points, normals=of.normals)
     if meshes[1 - contact] is None:
         nodes[1] = np.empty(0, dtype=np.int64)
-        grids = [Grid(x=line.s, weights=trapezoid(line.s), points=line.points, normals=line.normals)] * 2
+        grids = [grid_of(line)] * 2
     elif _same(line.s, s, within):
         # one line for both roles, so that constants have the same digits in both
         alike = bool(kept.all()) and line.alike(own) and own.alike(other)
         own = lines[0] if alike else line
-        grids = [Grid(x=own.s, weights=trapezoid(own.s), points=own.points, normals=own.normals)] * 2
+        grids = [grid_of(own)] * 2
     else:
         x, P, w = _transfer(problem, line.s, s)
-        grids = [
-            Grid(x=line.s, weights=trapezoid(line.s), points=line.points, normals=line.normals),
-            Grid(x=x, weights=w, points=other.points[kept], normals=normals),
-        ]
+        grids = [grid_of(line), Grid(x=x, weights=w, points=other.points[kept], normals=normals)]
     if all(
         np.array_equal(grid.upright, [(0.0, 1.0)] * grid.n) for grid in grids
     ):  # upright: the components are those along x and y
         grids = [replace(grid, normals=None) for grid in grids]
-    gap = _gap(problem, seen.gap if contact == 0 else -seen.gap, within)
+    gap = _gap(problem, (1 - 2 * contact) * seen.gap, within)
     j = int(np.argmin(gap))
     if gap[j] < -MOST_OVERLAP * height:
-        depth = f"by {-gap[j]:.4g} at ({line.points[j, 0]:g}, {line.points[j, 1]:g})"
-        needed = f"needed an overlap of at most {100 * MOST_OVERLAP:g} % of the smaller extent {height:g}"
+        depth = f"by {-gap[j]:.4g} at {place_of(line.points[j])}"
+        needed = f"needed an overlap of at most {100 * MOST_OVERLAP:g} % of the smaller extent {height:g}{APART}"
         raise refuse(f"the bodies lie in each other {depth}: {needed}")
     return nodes if contact == 0 else nodes[::-1], grids if contact == 0 else grids[::-1], P, gap
+
+
+def held_normals(held: Supports | None, nodes: Ints, normals: Floats) -> NDArray[np.bool_]:
+    """Return True for the nodes whose normal component, or a part of it, a support holds."""
+    return np.zeros(len(nodes), bool) if held is None else np.asarray((held.held[nodes] & (normals != 0)).any(axis=1))
+
+
+def _between_supports(line: Line, other: Line, known: list[Supports | None], contact: int) -> Line:
+    """Cut off the ends of Gamma_c that lie apart where a support holds a normal of the contact body, or opposite."""
+    seen = line.seen_from(other)
+    opposite = np.interp(line.s, seen.s, held_normals(known[1 - contact], other.nodes, line.normals_at(seen.s)))
+    held = held_normals(known[contact], line.nodes, line.normals) | (opposite > SAME)
+    free = np.flatnonzero(~held | ((1 - 2 * contact) * seen.gap <= line.slack))
+    return line.part(slice(free[0], free[-1] + 1)) if len(free) > 1 else line
 
 
 def facing_parts(own: list[Line], others: list[Line], side: str, reach: float) -> tuple[Line, Line, Line]:
@@ -232,8 +260,7 @@ def facing_parts(own: list[Line], others: list[Line], side: str, reach: float) -
         for before, after in ((one, second), (second, one)):
             if before.nodes[-1] == after.nodes[0]:
                 raise MeshError(f"faces both sides of a corner: {before.corner(after, side)}")
-        x, y = second.points[len(second.points) // 2]
-        raise MeshError(f"faces another part too, near ({x:g}, {y:g})")
+        raise MeshError(f"faces another part too, near {place_of(second.points[len(second.points) // 2])}")
     if line.nodes[0] == line.nodes[-1]:
         raise MeshError("faces all of a closed line: needed parts with two ends")
     return line, one, other
@@ -273,7 +300,7 @@ def _surfaces(problem: Problem, meshes: list[Mesh | None], ends: Ends | None) ->
             else:
                 nodes.append(surface(mesh, upper=upper, ends=ends))
         except MeshError as error:
-            needed = f"{error}; needed the part of the x axis where they meet"
+            needed = f"{error}; needed the part of the x axis where they meet, or else {BY_NAME}"
             raise problem.refuse("contact.interval", None, needed) from None
     return nodes
 
@@ -301,7 +328,7 @@ def _ends(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], size: 
     overlap = (max(low for low, _ in reach), min(high for _, high in reach))
     if not overlap[1] - overlap[0] > SAME * size:
         covers = ", ".join(f"body {i} covers x = {low:g} to {high:g}" for i, (low, high) in enumerate(reach, 1))
-        raise problem.refuse("body2.x", None, f"the bodies do not meet: {covers}")
+        raise problem.refuse("body2.x", None, f"the bodies do not meet: {covers}; {BY_NAME}")
     if chosen is None:
         return overlap
     if chosen[0] < overlap[0] - SAME * size or chosen[1] > overlap[1] + SAME * size:
@@ -339,7 +366,7 @@ def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints],
         possible = fits[1 - contact] and other is not None and _flat(other.points[nodes[1 - contact]])
         needed = (
             f"Gamma_c = [{ends[0]:g}, {ends[1]:g}] must begin and end at nodes of the contact body, body {contact + 1},"
-            f" whose nodes near its ends lie at {near or 'no x'}{swap if possible else ''}"
+            f" whose nodes near its ends lie at {near or 'no x'}{swap if possible else CUT}"
         )
         raise problem.refuse("contact.interval", given, needed)
 
@@ -393,7 +420,6 @@ def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:
         return
     rise = _slopes(own)
     j = int(np.argmax(np.abs(rise)))
-    (left, low), (right, high) = own[j : j + 2]
     remedy = f"body {3 - contact} is steep too: name both sides by contact.surface, which takes lines of any shape"
     if _flat(other):
         remedy = f"body {3 - contact} is flat: give body {contact} the Neumann problem"
@@ -401,9 +427,9 @@ def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:
     raise problem.refuse(
         f"body{contact}.mesh",
         None,
-        f"body {contact} is the contact body, and its line has the slope {rise[j]:.3g} from ({left:g}, {low:g}) to"
-        f" ({right:g}, {high:g}); needed at most {STEEPEST:g} along Gamma_c, where its normals are taken as vertical;"
-        f" {remedy}",
+        f"body {contact} is the contact body, and its line has the slope {rise[j]:.3g} from {place_of(own[j])}"
+        f" to {place_of(own[j + 1])}; needed at most {STEEPEST:g} along Gamma_c, where its normals are taken as"
+        f" vertical; {remedy}",
     )
 
 

@@ -321,7 +321,7 @@ class ContactPair(Value):
     def warnings(self) -> list[str]:
         """Facts that a user should know before trusting the numbers."""
         path = [] if self.problem is None else path_warnings(self.problem)
-        return warnings_of(self.interface, self.friction, self._meshed) + path
+        return warnings_of(self.interface, self._meshed) + path
 
 
 def pair_from(

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from fem1d2d import Mesh, MeshError, Supports
-from fem1d2d.mesh import Floats, Ints, shared
+from fem1d2d.mesh import Floats, Ints, place_of, shared
 from verification.interface.friction import OF_TWO
 from verification.interface.interface import Grid, Interface, Law, Stretch
 from verification.interface.joining import check_profile, join
@@ -56,13 +56,6 @@ class Blocks(Value, Law):
             zero = np.zeros((part.contact.n, part.neumann.n))
             blocks.append(zero if part.kernel is None else scale * part.kernel)
         return np.asarray(block_diag(*blocks))
-
-    def warnings(self, interface: Interface) -> list[str]:
-        found = []
-        for i, (part, scale) in enumerate(zip(self.parts, self.scales, strict=True), 1):
-            texts = part.law.warnings(part) if part.law is not None and scale else []
-            found += [text.replace("contact.", f"contact[{i}].", 1) for text in texts]
-        return found
 
     def warnings_after(self, interface: Interface, k: float, pressure: Floats, bound: Floats) -> list[str]:
         found = []
@@ -136,13 +129,11 @@ def join_lines(
         joined.append(interface)
         for of_body, mesh, before, start, i in zip(nodes, meshes, found, first, order, strict=True):
             own = before + start
-            shared_with = [own[np.isin(own, earlier)] for earlier in of_body]
-            if common := [node for some in shared_with for node in some]:
-                assert mesh is not None
-                x, y = map(float, mesh.points[common[0]])
+            common = np.intersect1d(own, np.concatenate([own[:0], *of_body]))
+            if len(common) and mesh is not None:
                 needed = (
-                    f"two contacts share the node of body {i} at ({x:g}, {y:g}): needed sides, or parts of sides, that"
-                    " have no node in common along their lines of contact"
+                    f"two contacts share the node of body {i} at {place_of(mesh.points[common[0]])}: needed sides, or"
+                    " parts of sides, that have no node in common along their lines of contact"
                 )
                 raise problem.refuse(f"contact[{number}].surface", list(line.surface or ()), needed)
             of_body.append(own)

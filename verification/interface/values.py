@@ -57,12 +57,11 @@ def values_at_points(bodies: TwoBodies, moved: Displacements) -> tuple[PointValu
     moved : pair of array or None
         Displacement of all nodes of body 1 and of body 2, shape (nodes, d), unit of length; None where rigid.
     """
-    fields = {body.name: u for body, u in zip((bodies.body1, bodies.body2), moved, strict=True) if body is not None}
+    fields = {body.name: u for body, u in bodies.each(moved)}
     tensors: dict[str, Floats] = {}
     found = []
     for body, number, name, point, place in bodies.places:
         u = fields[body.name]
-        assert u is not None
         if body.name not in tensors:
             tensors[body.name] = stresses(body.mesh, body.material, u)
         mean = place.of_cells(tensors[body.name])
@@ -100,13 +99,11 @@ def values_on_sides(bodies: TwoBodies, moved: Displacements) -> dict[str, list[A
     its pieces.  ``moved`` as of :func:`values_at_points`.
     """
     table: dict[str, list[Any]] = {}
-    for number, body, u in ((1, bodies.body1, moved[0]), (2, bodies.body2, moved[1])):
-        if body is None or u is None:
-            continue
+    for body, u in bodies.each(moved):
         mesh, d = body.mesh, body.mesh.dimension
         stress = means_at_nodes(mesh, stresses(mesh, body.material, u))
         for side in mesh.sides:
-            owner, _, own = side.partition(".") if bodies.problem.several else (f"body{number}", "", side)
+            owner, _, own = side.partition(".") if bodies.problem.several else (body.name, "", side)
             for nodes in chains(mesh.along(side)) if d == 2 else mesh.along(side):
                 at = mesh.points[nodes].astype(float)
                 steps = np.linalg.norm(np.diff(at, axis=0), axis=1)

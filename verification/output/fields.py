@@ -46,9 +46,8 @@ def write_fields(result: Run | Solution, room: Path, place: str = "") -> None:
     """
     bodies, units = result.bodies, result.units
     says = f"lengths in {units['length']}, stresses in {units['stress']}"
-    for body, u in zip((bodies.body1, bodies.body2), result.displacements, strict=True):
-        if body is not None and u is not None:
-            _write(room / f"{body.name}{place}.vtu", body, u, says)
+    for body, u in bodies.each(result.displacements):
+        _write(room / f"{body.name}{place}.vtu", body, u, says)
 
 
 def _write(path: Path, body: Body, u: Floats, says: str) -> None:

@@ -12,6 +12,7 @@ from sample_runs import SAMPLES
 import verification as vf
 from verification.cli.problems import examples
 from verification.interface import checks
+from verification.interface.friction import Nonlocal
 
 TOO_SHORT = changed(body1={"cells": [20, 3]}, body2={"cells": [12, 3]}, contact={"interval": ["0.7", "1.3"]})
 
@@ -187,3 +188,18 @@ def test_runs_and_sweeps_check_nothing_before_they_are_asked(monkeypatch):
     assert vf.run(problem).converged
     assert vf.solve(problem).contact.force["normal"] > 0
     assert [row["outcome"] for row in vf.sweep(problem, theta=["0.6", "0.7"]).rows] == ["converged"] * 2
+
+
+def test_of_the_kernel_the_part_that_is_closed_is_looked_at():
+    """Nodes that are fine where the bodies touch, and coarse beside it."""
+    x, radius = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 1.0, 2.0]), 0.11
+    pair = vf.build(S1=np.eye(14), S2=np.eye(14), x=x, law=Nonlocal(radius=radius), friction=0.2)
+    said = lambda pressure: pair.interface.law.warnings_after(pair.interface, 0.2, pressure, pressure)
+    (everywhere,) = said(np.ones(7))
+    assert everywhere.startswith("contact.radius = 0.11 is below the mesh width 1: ")
+    assert said(np.array([1.0, 1, 1, 1, 0, 0, 0])) == []
+    wide = vf.build(S1=np.eye(14), S2=np.eye(14), x=np.arange(7) / 10, law=Nonlocal(radius=0.15), friction=0.2)
+    said = lambda pressure: wide.interface.law.warnings_after(wide.interface, 0.2, pressure, pressure)
+    assert said(np.ones(7)) == []
+    (few,) = said(np.array([0.0, 0, 1, 1, 0, 0, 0]))
+    assert "contact.radius = 0.15 is not small against the length 0.2 of the closed part of Gamma_c" in few

@@ -144,3 +144,79 @@ def test_sides_that_are_parts_from_corner_to_corner_are_not_cut():
     assert (named.cut_length, named.cut_depth) == (0, 0)
     assert (not_named.cut_length, not_named.cut_depth) == (None, None)
     assert not_named.to_dict()["reason"]["cut_length"] == "no side is named"
+
+
+# --- supports at the ends of whole sides ------------------------------------------------------------------------------
+
+
+def held(folder, neumann_body=1, **above):
+    """The disc, held by the part of its circle that ends where the rest begins, which is named as a whole."""
+    rest = disc(folder / "held.msh", (0, 1), 1, 48, top=-0.5, prescribed={"top": [0, "-0.02"]})
+    return vf.Problem.from_dict(
+        {
+            "body1": BLOCK,
+            "body2": rest | above,
+            "contact": {"surface": ["top", "rest"]},
+            "iteration": {"neumann_body": neumann_body},
+        }
+    )
+
+
+@pytest.mark.parametrize("neumann_body", [1, 2])
+def test_an_end_of_a_whole_side_that_a_support_holds_apart_from_the_other_side_is_cut_off(neumann_body, tmp_path):
+    found = vf.solve(held(tmp_path, neumann_body))
+    part = vf.solve(
+        held(tmp_path, neumann_body, parts={"low": {"side": "rest", "x": ["-0.75", "0.75"]}}).with_keys(
+            {"contact.surface": '["top", "low"]'}
+        )
+    )
+    assert found.contact.pressure.max() == pytest.approx(part.contact.pressure.max(), rel=1e-9)
+    assert found.checks.cut_depth == 0
+    assert not found.warnings
+
+
+def test_a_support_at_a_node_that_touches_is_refused_with_its_place_and_the_remedy():
+    """The left side of the upper block is moved, whose lower end lies on the lower block."""
+    above = {"prescribed": {"top": [0, "-1/50"], "left": ["free", "-1/50"]}}
+    data = blocks(body2=above, contact={"surface": ["top", "bottom"]})
+    with pytest.raises(vf.ProblemError) as refused:
+        vf.solve(vf.Problem.from_dict(data))
+    said = "side 'left' holds the one at (0, 0); leave it free, or let Gamma_c end before it, by a part of the side"
+    assert str(refused.value).endswith(said)
+
+
+def test_a_body_held_all_along_the_contact_is_told_to_be_an_obstacle():
+    for surface, held in ((["top", "bottom"], {"fixed": ["bottom", "top"]}), (None, {"fixed": ["top"]})):
+        contact = {"surface": surface} if surface else {}
+        data = blocks(body1={**held}, contact=contact)
+        with pytest.raises(vf.ProblemError, match=r'is an obstacle: body1\.shape = "rigid" in place of its mesh'):
+            vf.solve(vf.Problem.from_dict(data))
+
+
+# --- refusals name what helps -----------------------------------------------------------------------------------------
+
+
+def test_a_side_of_one_edge_that_is_not_faced_as_a_whole_is_refused_with_the_roles_that_work():
+    """The lower block has one cell along a line that the upper one covers in part."""
+    data = blocks(body1={"x": [-1, 2], "cells": [1, 2]}, contact={"surface": ["top", "bottom"]})
+    data["iteration"] = {"neumann_body": 2}
+    problem = vf.Problem.from_dict(data)
+    with pytest.raises(vf.ProblemError, match="it is found with exchanged roles: let body 1 have the Neumann problem"):
+        vf.solve(problem)
+    assert vf.solve(problem.changed(neumann_body=1)).contact.force["normal"] > 0
+
+
+@pytest.mark.parametrize(
+    ("keys", "remedy"),
+    [
+        ({"body2.x": "[5, 6]"}, "contact.surface names sides that face each other in any direction"),
+        ({"body2.y": "[-0.5, 0.5]"}, "draw them apart, or give contact.gap (of two bodies)"),
+        ({"contact.interval": "[0.1, 1]"}, "contact.surface instead cuts whole sides to whole edges"),
+        ({"body2.traction.bottom": "[0, 1]"}, "point_load gives one to its nodes"),
+    ],
+)
+def test_a_refusal_names_its_remedy(keys, remedy):
+    problem = vf.Problem.from_dict(blocks()).with_keys(keys)
+    with pytest.raises(vf.ProblemError) as refused:
+        vf.solve(problem)
+    assert remedy in str(refused.value)

@@ -150,6 +150,11 @@ def block(radius, friction="0.2"):
     }
 
 
+def of_the_kernel(data):
+    """What is said of the radius after the problem is solved."""
+    return [text for text in vf.solve(vf.Problem.from_dict(data)).warnings if "radius" in text]
+
+
 def carried(radius):
     """Tangential force over k times the normal one."""
     solution = vf.solve(vf.Problem.from_dict(block(radius))).to_dict()
@@ -159,15 +164,15 @@ def carried(radius):
 
 @pytest.mark.parametrize("radius", ["0.4", "0.7", "1", "2"])
 def test_a_wide_kernel_is_warned_of_with_what_its_ends_lose(radius):
-    (warning,) = warned(block(radius))
+    (warning,) = of_the_kernel(block(radius))
     percent = float(re.search(r"carries (\d+) % of k times the normal force", warning)[1])
     assert percent / 100 == pytest.approx(carried(radius), abs=0.015)
-    assert f"contact.radius = {radius} is not small against the length 1 of Gamma_c" in warning
+    assert f"contact.radius = {radius} is not small against the length 1 of the closed part of Gamma_c" in warning
 
 
 @pytest.mark.parametrize("radius", ["0.025", "0.04"])
 def test_a_kernel_narrower_than_a_cell_is_warned_of_with_its_multiple_of_friction(radius):
-    (warning,) = warned(block(radius))
+    (warning,) = of_the_kernel(block(radius))
     multiple = float(re.search(r"multiplies friction by about width/radius = ([\d.]+)", warning)[1])
     assert multiple == pytest.approx(0.05 / float(radius))
     assert carried(radius) == pytest.approx(multiple, rel=0.05)
@@ -175,19 +180,19 @@ def test_a_kernel_narrower_than_a_cell_is_warned_of_with_its_multiple_of_frictio
 
 @pytest.mark.parametrize("radius", ["0.05", "0.1", "0.2", "0.25"])
 def test_a_kernel_that_is_wide_beside_a_cell_and_narrow_beside_the_interface_is_not_warned_of(radius):
-    assert warned(block(radius)) == []
+    assert of_the_kernel(block(radius)) == []
     assert carried(radius) == pytest.approx(1 - float(radius) / 3, abs=0.02)
 
 
 @pytest.mark.parametrize("radius", ["0.01", "2"])
 def test_without_friction_the_kernel_changes_nothing_and_is_not_warned_of(radius):
-    assert warned(block(radius, friction=0)) == []
+    assert of_the_kernel(block(radius, friction=0)) == []
 
 
 def test_a_radius_between_one_and_two_cells_that_adds_a_tenth_is_warned_of():
     fine = block("0.0133333")
     fine["body1"]["cells"], fine["body2"]["cells"] = [300, 2], [100, 2]
-    (warning,) = warned(fine)
+    (warning,) = of_the_kernel(fine)
     assert "contact.radius = 0.0133333 is no multiple of the mesh width 0.01" in warning
     assert "by about 1.12" in warning
 
@@ -279,7 +284,9 @@ def test_the_file_of_a_mesh_of_the_paper_says_what_its_radius_is_against_the_mes
     assert ("half the lower body's mesh width" in text) == (width == pytest.approx(0.2)) == (nodes == 60)
     assert ("between the mesh width and 0.3 times the length of Gamma_c" in text) == (width < 0.1 + 1e-9)
     narrow = "sees single nodes and multiplies the friction bound of a node by 0.00 to 2.00"
-    assert any(narrow in warning for warning in bodies.warnings) == (nodes == 60)
+    if nodes == 60:  # no node is open
+        solution = vf.solve(bodies)
+        assert any(narrow in warning for warning in solution.warnings)
     assert (even.min() == pytest.approx(0) and even.max() == pytest.approx(2)) == (nodes == 60)
 
 
