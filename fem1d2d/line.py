@@ -10,7 +10,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem1d2d.mesh import Bools, Floats, Ints, Mesh, MeshError, place_of
 from fem1d2d.trace import SAME
