@@ -21,7 +21,6 @@ from verification.extras import EXTRAS
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-DISTRIBUTIONS = packages_distributions()
 PROMISED = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
 
 
@@ -90,7 +89,8 @@ def missing(found: Iterable[Import]) -> set[str]:
     """The distributions whose modules are imported and which are no dependencies."""
     tops = {each.name.partition(".")[0] for each in found if each.kind != "name"}
     tops -= {"mpl_toolkits", *HOSTS, *PACKAGES, *sys.stdlib_module_names}
-    return {DISTRIBUTIONS[name][0].lower() for name in tops} - named(PROJECT["dependencies"])
+    distributions = packages_distributions()
+    return {distributions[name][0].lower() for name in tops} - named(PROJECT["dependencies"])
 
 
 def test_a_plain_installation_has_all_that_the_packages_import_but_for_extras_and_the_test_kit(ours):

@@ -7,9 +7,12 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 
+FILES = sorted(ROOT.glob("tests/*/**/test_*.py"))
+
+
 def _tests(names: str) -> tuple[str, ...]:
     """The files of tests by what they are about, in whichever folder they lie."""
-    found = {name: sorted(ROOT.glob(f"tests/*/**/test_{name}.py")) for name in names.split()}
+    found = {name: [path for path in FILES if path.name == f"test_{name}.py"] for name in names.split()}
     if unclear := [name for name, paths in found.items() if len(paths) != 1]:
         raise ValueError(f"needed one file of tests for each of {', '.join(unclear)}")
     return tuple(paths[0].relative_to(ROOT).as_posix() for paths in found.values())

@@ -6,16 +6,19 @@ knows nothing of contact.  A solver that stops early is no oracle and no refutat
 tolerance of the test follows from the one that came through.
 """
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import dataclass
 from math import sqrt
+from typing import TYPE_CHECKING
 
 import pytest
-from cvxpy.error import SolverError
-from PEPit import PEP
-from PEPit.functions import SmoothStronglyConvexFunction
 
 from ndtheory import EnergyConstants, evaluate_energy
+
+if TYPE_CHECKING:  # it takes half a second, which is spent where one of these tests runs
+    from PEPit import PEP
 
 #: Tried in this order until one says that it has solved the program: the solver, and the tolerance it is given.  Which
 #: programs Clarabel solves to 1e-9 hangs on the last digit, and so on the kernels of the BLAS; of 380 programs, each
@@ -47,6 +50,8 @@ class Worst:
 
 def both_sides(problem: PEP, solver: str, tolerance: float) -> tuple[float, float]:
     """The bound from above and the example from below; RuntimeError from a solver that stops before its tolerance."""
+    from cvxpy.error import SolverError
+
     options = dict.fromkeys(OPTIONS[solver], tolerance) | {"wrapper": "cvxpy", "solver": solver, "verbose": 0}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -76,6 +81,9 @@ def worst_case(problem: PEP, scale: float = 1, attempts=ATTEMPTS) -> Worst:
 
 def convex_energy(rho):
     """A problem, its energy, and where that is least."""
+    from PEPit import PEP
+    from PEPit.functions import SmoothStronglyConvexFunction
+
     problem = PEP()
     energy = problem.declare_function(SmoothStronglyConvexFunction, mu=1, L=1 + rho)
     return problem, energy, energy.stationary_point()

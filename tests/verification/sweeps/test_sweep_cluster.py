@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from contextlib import ExitStack, contextmanager, suppress
+from importlib.util import find_spec
 
 import pytest
 from processes import environment
@@ -15,7 +16,8 @@ from verification.sweeps.grid import SweepGrid
 from verification.sweeps.store import plan
 from verification.sweeps.workers import NoWorkers
 
-pytest.importorskip("distributed", reason="the extra `cluster` is not installed: there is no dask to sweep on")
+needs_dask = "the extra `cluster` is not installed: there is no dask to sweep on"
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason=needs_dask)
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 GRID = {"theta": [f"{n}/40" for n in range(1, 40)], "friction": [0, "1/5", "2/5"]}

@@ -1,6 +1,7 @@
 """A sweep as a labelled dataset: every value stands at its place, with units, version and problem inside."""
 
 import json
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from verification.sweeps import workers
 from verification.sweeps.export import dataset, write_dataset
 from verification.sweeps.row import RESULTS
 
-pytest.importorskip("xarray", reason="the extra `dataset` is not installed: there is nothing to export to")
-pytest.importorskip("netCDF4", reason="the extra `dataset` is not installed: there is nothing to export to")
+needs_dataset = "the extra `dataset` is not installed: there is nothing to export to"
+pytestmark = pytest.mark.skipif(not all(map(find_spec, ("xarray", "netCDF4"))), reason=needs_dataset)
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 
