@@ -727,10 +727,10 @@ check(
 @cache
 def _waves() -> tuple[Any, ...]:
     """h, m >= 0 and the coefficient of cos((2m+1) pi x/h) in a hat of base 2h and height 1."""
-    width, x = sp.Symbol("h", positive=True), sp.Symbol("x", real=True)
+    (width, wave), x = sp.symbols("h xi", positive=True), sp.Symbol("x", real=True)
     j = sp.Symbol("m", integer=True, nonnegative=True)
-    wave = (2 * j + 1) * sp.pi / width
-    return width, j, sp.simplify(2 * sp.integrate((1 - x / width) * sp.cos(wave * x), (x, 0, width)))
+    found = 2 * sp.integrate((1 - x / width) * sp.cos(wave * x), (x, 0, width))  # quick for a symbol
+    return width, j, sp.simplify(found.subs(wave, (2 * j + 1) * sp.pi / width))
 
 
 def _saw_tooth(form: Any) -> list[Goal]:
