@@ -52,20 +52,21 @@ class Interval:
         return cls(_rounded(lo, _down), _rounded(hi, _up))
 
     def __add__(self, other: Any) -> Interval:
-        o = Interval.of(other)
+        o = other if isinstance(other, Interval) else Interval.of(other)
         return Interval(_down.add(self.lo, o.lo), _up.add(self.hi, o.hi))
 
     def __neg__(self) -> Interval:
         return Interval(self.hi.copy_negate(), self.lo.copy_negate())
 
     def __sub__(self, other: Any) -> Interval:
-        return self + -Interval.of(other)
+        o = other if isinstance(other, Interval) else Interval.of(other)
+        return Interval(_down.subtract(self.lo, o.hi), _up.subtract(self.hi, o.lo))
 
     def __rsub__(self, other: Any) -> Interval:
-        return Interval.of(other) + -self
+        return Interval.of(other) - self
 
     def __mul__(self, other: Any) -> Interval:
-        o = Interval.of(other)
+        o = other if isinstance(other, Interval) else Interval.of(other)
         if not self.lo.is_signed():  # the signs of the other ends decide
             lo, hi = (self.hi if o.lo.is_signed() else self.lo), (self.lo if o.hi.is_signed() else self.hi)
             return Interval(_down.multiply(lo, o.lo), _up.multiply(hi, o.hi))
