@@ -138,9 +138,8 @@ class Layer:
                 found = above - across @ np.linalg.solve(below + found, _adjoint(across))
             return _hermitian(found)
         for _ in range(MOST_DOUBLINGS):
-            inner = below + above  # the middle row of two equal slabs
-            up, down = np.linalg.solve(inner, _adjoint(across)), np.linalg.solve(inner, across)
-            change = across @ up
+            inner = np.linalg.solve(below + above, np.concatenate([_adjoint(across), across], axis=-1))
+            change, down = across @ inner[..., :n], inner[..., n:]  # the middle row of two equal slabs is left out
             above, below, across = above - change, below - _adjoint(across) @ down, -across @ down
             if (np.abs(change).max((1, 2)) <= CHANGE * np.abs(above).max((1, 2))).all():
                 break
