@@ -64,6 +64,7 @@ def widget(
     question: str,
     answers: Sequence[str],
     right: str,
+    wrong: Mapping[str, str],
     why: str,
     sliders: Sequence[Mapping[str, Any]],
     charts: Sequence[Mapping[str, Any]],
@@ -76,6 +77,8 @@ def widget(
     ----------
     question, right, why : str
         What is asked, the answer, and what is said after it.
+    wrong : mapping
+        What is said first of each other choice: a sentence.
     answers : sequence of str
         The choices, the right one among them.
     sliders, charts : sequence of mapping
@@ -86,12 +89,13 @@ def widget(
         By :func:`scene`: one for each combination of positions, in the order of the sliders.
     """
     positions = set(product(*(range(len(each["values"])) for each in sliders)))
-    if right not in answers or set(scenes) != positions:
-        raise ValueError(f"{question}: needed the right answer among {answers} and a scene for each of {positions}")
+    if {right, *wrong} != set(answers) or set(scenes) != positions:
+        raise ValueError(f"{question}: needed {answers} right or wrong, and a scene for each of {positions}")
     return {
         "question": question,
         "answers": list(answers),
         "right": right,
+        "wrong": dict(wrong),
         "why": why,
         "sliders": list(sliders),
         "charts": list(charts),

@@ -11,6 +11,8 @@ nd.onPage("cobweb", (figure) => {
       + "blue line, sideways to the dashed one, and again. Where does this end?",
     answers: ["at the star, where the lines cross", "nowhere: it goes round for ever", "nowhere: the force grows without limit"],
     right: "nowhere: it goes round for ever",
+    wrong: { "at the star, where the lines cross": "at the star the blue line is steeper than the diagonal, so a step from beside it leads away.",
+      "nowhere: the force grows without limit": "where the bars part the force is zero, and there it starts again." },
     reveal: () => `it goes round between 0 and ${nd.short(T(0))}. In contact the blue line is steeper than the diagonal (rho = ${rho}), so each `
       + "step leads further from the star, until the bars part; then the force is 0 again. Now move theta: the dot of the larger "
       + "factor must come below 1. Where is it lowest?",

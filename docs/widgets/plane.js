@@ -10,6 +10,8 @@ nd.onPage("plane", (figure) => {
     question: "Which region moves when stresses are written in GPa instead of MPa?",
     answers: ["all of them", "the printed one", "none"],
     right: "the printed one",
+    wrong: { "all of them": "the other two compare stresses with stresses alone, which no unit changes.",
+      none: "a formula that adds a number to a stress changes with the unit." },
     reveal: () => "only the printed one, because it adds the number 1 to stresses. The unit is now 1000 MPa, which is 1 GPa: the dashed region "
       + "has moved from the dotted one. The bodies have not changed, so no true threshold can.",
     show: () => { unit.value = 3; },

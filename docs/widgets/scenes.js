@@ -4,7 +4,7 @@ for (const [name, data] of Object.entries(ndData).filter(([, one]) => one.scenes
     "use strict";
     const widget = nd.build(figure, {
       name, question: data.question, answers: data.answers,
-      right: data.right,
+      right: data.right, wrong: data.wrong,
       reveal: () => data.why,
       show: () => sliders.forEach((slider, i) => { slider.value = data.sliders[i].start; }),
       draw,

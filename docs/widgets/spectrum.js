@@ -11,6 +11,7 @@ nd.onPage("spectrum", (figure) => {
     question: "theta = 0.6 works well with the lower, stiffer body as Neumann body. What happens if the roles are swapped?",
     answers: ["it works as well", "it is slower", "it does not converge"],
     right: "it does not converge",
+    wrong: { "it works as well": "the other role has other eigenvalues.", "it is slower": "it would be, at a smaller theta." },
     reveal: () => `it does not converge. Swapping the roles turns each eigenvalue into its inverse. ${growing} of ${all.length} now exceed `
       + `2/theta - 1 = ${nd.short(2 / 0.6 - 1)}, where the factor is 1; the largest of them, rho, has the largest factor.`,
     show: () => { theta.value = thetas.indexOf(0.6); step.value = 39; swap.on = true; },

@@ -199,7 +199,7 @@ window.nd = (() => {
   // A frame for a widget: a question to answer first, controls, pictures, what they say, the numbers, a link.  Where the
   // right answer is given, the outcome is hidden until somebody answers: what is not in `pictures` waits, and draw() leaves
   // out what `revealed` is for. Then the words say why, and show() moves the widget to the state that shows it.
-  function build(figure, { name, question, answers, right = null, reveal, show = () => {}, draw }) {
+  function build(figure, { name, question, answers, right = null, wrong = {}, reveal, show = () => {}, draw }) {
     const given = right !== null && Object.keys(remembered(name)).length > 0; // a link to a state was made after the answer
     const widget = { name, sliders: {}, buttons: {}, revealed: given, controls: html("div", { class: "controls" }),
       pictures: html("div", { class: "pictures" }), says: html("p", { class: "says", "aria-live": "polite" }),
@@ -216,9 +216,10 @@ window.nd = (() => {
       widget.answered = true;
       told.focus({ preventScroll: true }); // the button that had it is gone
     };
-    const verdict = (answer) => (right === null ? `You said: ${answer}.` : answer === right ? "Right:" : "Not quite:");
+    const verdict = (answer) => (right === null ? `You said: ${answer}.` : answer === right ? "Right:" : `Not quite: ${wrong[answer]}`);
+    const capital = (sentence) => sentence[0].toUpperCase() + sentence.slice(1);
     for (const answer of answers) {
-      ask.append(html("button", { type: "button", onclick: () => open(`${verdict(answer)} ${reveal()}`) }, answer));
+      ask.append(html("button", { type: "button", onclick: () => open(`${verdict(answer)} ${right === null || answer === right ? reveal() : capital(reveal())}`) }, answer));
     }
     ask.append(html("button", { type: "button", class: "reveal", onclick: () => open(`${right === null ? "" : "Answer: "}${reveal()}`) }, "Just show me"));
     ask.hidden = given;

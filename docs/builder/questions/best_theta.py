@@ -78,6 +78,10 @@ def data() -> dict[str, Any]:
         f"the norm, where is the best theta at k = {ASKED}?",
         answers=[others[1], others[0], right],
         right=right,
+        wrong={
+            others[0]: "the free norm moves the best theta further than half way.",
+            others[1]: "that is the best theta in (5.21), whose factor is larger.",
+        },
         why=f"the least factor in a free norm is {asked['free'][1]:.3f} there, and {asked['energy'][1]:.3f} is the "
         f"least one in (5.21). At k = {BEFORE} the best theta in a free norm is {first['free'][0]:.2f}. Move k.",
         sliders=[slider("k", "friction k", [f"{k:g}" for k in frictions], frictions.index(ASKED))],

@@ -105,6 +105,10 @@ def data() -> dict[str, Any]:
         f"{asked.stop}, where the force changes by less than {_share(TOLERANCE)} of its size. How wrong is the force?",
         answers=[f"less than {_share(TOLERANCE)} of it", f"about {_share(10 * TOLERANCE)} of it", right],
         right=right,
+        wrong={
+            f"less than {_share(TOLERANCE)} of it": "the change of the force bounds no error of the force.",
+            f"about {_share(10 * TOLERANCE)} of it": "no fixed number of digits lies between a change and an error.",
+        },
         why="the test measures how far the rule chose to go. Here the mixture of the earlier forces is the last force "
         f"again, while the residual is {_share(asked.residuals[asked.stop])}. At both ends the pressure is "
         f"{ends[0] / ends[1]:.1f} times that of the solution. Choose another rule, and another first theta.",

@@ -86,6 +86,10 @@ def data() -> dict[str, Any]:
             "it grows without end",
         ],
         right=f"it tends to {asked:.2f} or more",
+        wrong={
+            f"it tends to {limit:g}, as without a mesh": "every mesh has waves as short as its cells.",
+            "it grows without end": "the cells keep their shape, and short waves their ratio.",
+        },
         why=f"the shortest waves have the ratio {asked:.3f} on every mesh of these cells, however fine it is. With "
         "cells of one shape on both sides long waves decide at this nu: move the first slider to 1.",
         sliders=[

@@ -58,6 +58,10 @@ def data() -> dict[str, Any]:
         "cells. Which constant changes by the largest factor?",
         answers=list(LOOKS),
         right="m",
+        wrong={
+            "M": f"M changes by a factor of {fall['M']:.1f} only.",
+            "C_R": f"C_R changes by a factor of {max(fall['C_R'], 1 / fall['C_R']):.1f} only.",
+        },
         why=f"m falls by a factor of {fall['m']:.0f}: a large plate can move far as a whole with little strain. "
         f"M falls by {fall['M']:.1f} because the cells are large too: with {HALVINGS[-1]} halvings it is back at "
         f"{100 * back:.0f} % of its value at size 1, while m stays low.",

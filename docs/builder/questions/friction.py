@@ -90,6 +90,10 @@ def data() -> dict[str, Any]:
         "Coulomb's law. Where does it end?",
         answers=["A opens, B sticks", "both open, as the load parts the bodies", "both stick, as friction holds them"],
         right="A opens, B sticks",
+        wrong={
+            "both open, as the load parts the bodies": "one load can have several solutions.",
+            "both stick, as friction holds them": "friction holds nothing without pressure.",
+        },
         why=f"at k = {ASKED} this load has {len(solutions(node(ASKED)))} solutions, and the start decides which one "
         f"the iteration finds. Up to k = {max(opening):g} A, B and the two other starts in the picture open. "
         f"Below k = {limit:.2f} it is proved that there is only one solution, whatever the load. Move k.",

@@ -109,6 +109,10 @@ def data() -> dict[str, Any]:
         f"By how much does it vary on meshes that are {FINER[-1]} times as fine?",
         answers=[right, f"{coarse / np.sqrt(FINER[-1]):.0f} percent", f"{coarse / FINER[-1]:.0f} percent"],
         right=right,
+        wrong={
+            f"{coarse / np.sqrt(FINER[-1]):.0f} percent": "such errors do not average out.",
+            f"{coarse / FINER[-1]:.0f} percent": "so it is with a consistent transfer, which this is not.",
+        },
         why="a finer mesh does not help. On every mesh some nodes above take the force of two nodes below, and others "
         "that of one, so the error stays as large and only its waves become shorter. Choose another transfer and other "
         "meshes.",

@@ -55,6 +55,10 @@ def data() -> dict[str, Any]:
         "Which theta is best if nobody knows which nodes are open?",
         answers=[f"1/(1+rho) = {once:.3f}", f"2/(2+rho) = {best:.3f}", f"2/(1+rho) = {limit:.3f}"],
         right=f"2/(2+rho) = {best:.3f}",
+        wrong={
+            f"1/(1+rho) = {once:.3f}": f"there the open node keeps {1 - once:.3f} of its error in each step.",
+            f"2/(1+rho) = {limit:.3f}": "there the closed shape is multiplied by -1 in each step and never falls.",
+        },
         why=f"at {best:.3f} each step multiplies both errors by {predicted_factor(best, rho):.3f}. "
         "Below it the open node is slower, above it the closed shape, "
         f"which grows from {limit:.3f} on. Move theta to both sides.",

@@ -99,6 +99,10 @@ def data() -> dict[str, Any]:
         f"for {len(logs[ASKED])} steps. What follows for rho?",
         answers=[f"rho = 2/theta - 1 = {bound:g}", right, "nothing, as it does not converge"],
         right=right,
+        wrong={
+            f"rho = 2/theta - 1 = {bound:g}": "so it is for tied bodies, and not in contact.",
+            "nothing, as it does not converge": "a run that does not converge excludes every rho with which it would.",
+        },
         why=f"theta = {ASKED:g} converges for every rho below {bound:g}, so a run that does not converge shows that "
         f"rho is {bound:g} or more. Here it is {rho:.2f}. Contact opens and closes alternately, which keeps the "
         "residual near one value at every theta that is too large. Move theta: between which thetas does a log show "

@@ -134,6 +134,10 @@ def data() -> dict[str, Any]:
         "with which the run will end. How do the right digits of that rate appear?",
         answers=["some more at each step", "nearly all at one step", "twice as many at each step"],
         right="nearly all at one step",
+        wrong={
+            "some more at each step": "while no node changes its state the matrix is the same at each step.",
+            "twice as many at each step": "that is how Newton's method gains digits.",
+        },
         why=f"at step {first.settled} a node changes its state for the last time. Before it at most "
         f"{max(digits[: first.settled]):.1f} digits are right, and from then on {min(digits[first.settled :]):.1f}. "
         f"Near k = {float(edge):.5f}, where one more node sticks, the last change comes later: move k.",

@@ -69,6 +69,10 @@ def data() -> dict[str, Any]:
         f"error of 1e-9 does it promise at its best theta? The fastest of these runs takes {best[0]}.",
         answers=["about a hundred", "about a hundred thousand", _words(printed)],
         right=_words(printed),
+        wrong={
+            "about a hundred": "so few are promised at a theta that the printed theorem does not allow.",
+            "about a hundred thousand": "that is nearer to the promise of the repaired theorem.",
+        },
         why="the printed theorem allows only theta below 3.5e-11. With such a theta the iteration hardly moves, and "
         f"no bound promises much less than its {_count(printed)} steps. The others allow larger theta: the repaired "
         f"theorem promises {_count(repaired)} steps at 5e-4, and the bound in energy norms {energy} at 0.8, where the "

@@ -88,6 +88,10 @@ def data() -> dict[str, Any]:
         f"says that every step contracts. Which of the other {len(without)} runs converge?",
         answers=["none of them", "those near the filled dots", "all of them"],
         right="all of them",
+        wrong={
+            "none of them": "no conclusion is no statement about a run.",
+            "those near the filled dots": "where a proof ends nothing happens to the runs.",
+        },
         why=f"all {len(given.rows)} runs converge. A proof says where convergence is certain, and nothing about the "
         f"other runs. Move the slider of the Neumann body: of {len(others)} runs without a proof {len(stalled)} stall.",
         sliders=[

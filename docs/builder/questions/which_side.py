@@ -59,6 +59,10 @@ def data() -> dict[str, Any]:
         "choice has the theta that is predicted as best for it.",
         answers=[f"as many, {good.steps}", f"{stiffer:g} times as many, {guess}", times],
         right=times,
+        wrong={
+            f"as many, {good.steps}": "both roles have the same solution, but not the same rho.",
+            f"{stiffer:g} times as many, {guess}": "the steps follow rho, which is not the ratio of the moduli.",
+        },
         why=f"{times}. For these roles rho is {bad.rho:.1f}, for the others {good.rho:.2f}, and a step is predicted to "
         f"leave rho/(2+rho) of the error: {predicted_rate(bad.rho):.2f} instead of {predicted_rate(good.rho):.2f}. "
         "Move E1/E2 until both take about as many steps.",
