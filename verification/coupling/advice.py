@@ -137,7 +137,8 @@ class Advice(Document):
         if least is not None and self.tied and not self.coupling.parallel:
             forms = {"2/(2+rho_min+rho)": 2 / (2 + least + rho)} | forms
         near = (form for form in forms if abs(forms[form] - theta) <= SAME_THETA * theta)
-        return next(near, "the theta of least factor over the eigenvalues and their errors")
+        of = "fewest steps" if role.spectrum is not None and role.spectrum.real else "least factor"
+        return next(near, f"the theta of {of} over the eigenvalues and their errors")
 
     methods: tuple[MethodRow, ...] = key(
         "steps of a constant theta, of Aitken and of IQN-ILS, in the roles as they are and exchanged, predicted on the "

@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from ndtheory.constants import take
@@ -19,7 +20,7 @@ from verification.algorithm.relaxation import InverseStep, Rule, rule_of
 from verification.coupling.advice import Advice
 from verification.coupling.kinds import kind_of
 from verification.coupling.spectrum import Spectrum
-from verification.coupling.vectors import last_piece, seen_in
+from verification.coupling.vectors import bears, last_piece, seen_in
 from verification.interface.matrices import real_array
 from verification.value import Value
 
@@ -88,7 +89,7 @@ class Coupling:
     ...     Tg = 1 - np.array([0.5, 3.0]) * (g - 1)
     ...     g = coupling.next(g, Tg)
     >>> round(coupling.spectrum.low, 6), round(coupling.spectrum.high, 6), coupling.advice.theta
-    (0.5, 3.0, 0.3636)
+    (0.5, 3.0, 0.3592)
     """
 
     def __init__(
@@ -112,6 +113,7 @@ class Coupling:
         self._scale: Floats | None = None
         self._seen: list[tuple[Floats, Floats, bool]] = []
         self._changed = False  # whether contact did, between evaluations that are forgotten
+        self._bore: NDArray[np.bool_] | None = None  # the entries that were not 0 in one of these
         self._anew = True
         self._advice: Advice | None = None
 
@@ -184,9 +186,10 @@ class Coupling:
             self._scale = np.repeat(sizes, len(g) // 2)
         if len(self._seen) > REMEMBERED:
             left = FIRST_ONES if self.kind.linear else 0
-            _, before, begins = self._seen.pop(left)
+            forgotten, before, begins = self._seen.pop(left)
             x, Tx, anew = self._seen[left]
             self._changed |= last_piece(np.array([before, Tx])) < 2
+            self._bore = bears(forgotten[np.newaxis], before[np.newaxis]) | (self._bore is not None and self._bore)
             self._seen[left] = x, Tx, anew or begins
         self._anew, self._advice = False, None
 
@@ -208,7 +211,8 @@ class Coupling:
         if self._advice is None and len(self._seen) > 1:
             X, TX, starts = map(np.array, zip(*self._seen, strict=True))
             try:
-                self._advice = Advice.of(seen_in(X, TX, kind=self.kind, starts=starts, changed=self._changed))
+                seen = seen_in(X, TX, kind=self.kind, starts=starts, changed=self._changed, bore=self._bore)
+                self._advice = Advice.of(seen)
             except ValueError:  # they do not differ above rounding
                 return None
         return self._advice

@@ -55,7 +55,7 @@ def advise_vectors(
     ...     X.append(0.6 * X[-1] + 0.4 * image(X[-1]))
     >>> found = advise_vectors(X, [image(x) for x in X])
     >>> round(found.spectrum.low, 9), round(found.spectrum.high, 9), found.theta
-    (0.5, 3.0, 0.3636)
+    (0.5, 3.0, 0.3592)
     """
     of = kind_of(kind, tied=tied, parallel=parallel)
     needed = "a row of real numbers for each iterate, two rows or more"

@@ -13,11 +13,8 @@ from fem1d2d.mesh import Floats
 from ndtheory.keys import Part, key
 from verification.algorithm.loop import Ending, Evaluation, Outcome, evaluations, follow
 from verification.coupling.kinds import METHODS, BodyNumber
-from verification.coupling.spectrum import Spectrum
+from verification.coupling.spectrum import TOLERANCE, Spectrum
 from verification.registry import RULES
-
-#: Steps are those until ``|T x - x| < 1e-6 |T x|``, as coupling libraries stop, from x = 0.
-TOLERANCE = 1e-6
 
 #: The most evaluations of T that are simulated, and those that a formula counts for a constant theta.
 MOST, COUNTED = 1000, 10**9

@@ -89,8 +89,8 @@ def _of_two_bodies(found: Advice) -> Iterator[Section]:
 @of.register
 def _of_vectors(evidence: Vectors, found: Advice) -> Iterator[Section]:
     yield from of_vectors(found, evidence)
+    yield from which_method(found)
     if found.roles:
-        yield from which_method(found)
         yield from paste_and_quote(found)
     if found.theta is None:
         again = f"ndtheory advise vectors {found.coupling.typed}X.npy TX.npy (with more iterates)"
@@ -263,7 +263,10 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     changes = found.coupling.given(", contact changes") + " or it is not linear"
     kinds = ["real: the coupling looks symmetric" if seen.symmetric else f"complex: it is not symmetric{changes}"]
     if seen.changing and not seen.negative:
-        kinds.append("contact changes between the iterates: a theta for open nodes as well")
+        bare = "nodes that are open bear no force in any, and have no error"
+        kinds.append(
+            f"contact changes between the iterates: {'a theta for open nodes as well' if seen.loaded else bare}"
+        )
         if seen.used < seen.iterates:
             kinds.append(f"read from the last {seen.used}, in which the same nodes are open")
     said.append(f"eigenvalues are {'; '.join(kinds)}")
@@ -287,8 +290,10 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
             notes.append("With the roles exchanged theta depends on the least eigenvalue, which is found.")
     else:
         theta, rate = found.chosen(found.best)
-        formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
-        formula = "2/(2 + 0 + largest), with 0 for open nodes" if seen.seen.low < spectrum.low else formula
+        ends = "0, for open nodes, and largest" if seen.seen.low < spectrum.low else "least and largest"
+        formula = (
+            f"fewest steps to 1e-6 with {ends}" if spectrum.real else "the theta of least factor over the spectrum"
+        )
         if found.coupling.parallel:
             formula = "1/(1 + largest)" if spectrum.low >= 0 else "the theta of least factor over both square roots"
         notes = [

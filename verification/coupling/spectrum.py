@@ -7,6 +7,7 @@ are real and at least 0 where both are symmetric stiffnesses; open nodes have la
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -18,6 +19,12 @@ from verification.value import Value
 
 #: Number of modes that stand for a spectrum of which only the ends are known.
 BETWEEN = 20
+
+#: Steps are those until ``|T x - x| < 1e-6 |T x|``, as coupling libraries stop, from x = 0.
+TOLERANCE = 1e-6
+
+#: The accuracy of a theta.
+EXACT = {"xatol": 1e-9}
 
 #: The least error of an end that has not settled, as a share of 1 + lambda.
 MARGIN = 0.03
@@ -104,15 +111,23 @@ class Spectrum(Value):
 
     @property
     def theta(self) -> float:
-        """The theta of least factor, the ends as far apart as their errors allow; ``2/(2+low+high)`` if it is real.
+        """The theta of fewest steps for both ends, as far apart as their errors allow, or of least factor.
 
-        0 where a mode grows for any theta above 0.
+        Of an estimate with real eigenvalues both ends arrive together from equal first errors: the residual of a stiff
+        mode is 1 + lambda times its error, so that theta is a little below ``2/(2+low+high)``, which it is where the
+        ends are known.  0 where a mode grows for any theta above 0.
         """
         low, high = self.low - self.error_low, self.high + self.error_high
         if self.low <= -1:
             return 0.0
         if self.real:
-            return 2 / (2 + (max(low, 0.0) if self.low >= 0 else low) + high)
-        z = 1 + self.values
+            low = max(low, 0.0) if self.low >= 0 else low if low > -1 else self.low
+            a, b = 1 + low, 1 + high
+            if self.source != "vectors" or not TOLERANCE < a < (1 - TOLERANCE) * b:
+                return 2 / (a + b)
+            cost = lambda theta: max(math.log(z / TOLERANCE) / -math.log(abs(1 - theta * z)) for z in (a, b))
+            return float(minimize_scalar(cost, bounds=(1 / b, 2 / (a + b)), method="bounded", options=EXACT).x)
+        z = 1 + np.append(self.values, self.values[-1] + self.error_high)
         most = float((2 * z.real / np.abs(z) ** 2).min())  # from there on a mode grows
-        return float(minimize_scalar(self.factor, bounds=(0, most), method="bounded", options={"xatol": 1e-9}).x)
+        factor = lambda theta: float(np.abs(1 - theta * z).max())
+        return float(minimize_scalar(factor, bounds=(0, most), method="bounded", options=EXACT).x)

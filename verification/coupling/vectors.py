@@ -42,6 +42,13 @@ SETTLED, MORE = 0.02, 3
 #: smooth data hide the stiff modes it changed by 0.06 or more as long as theta diverged.
 STEADY, FEWER, LEFT = 0.05, 2, 1
 
+#: An end that rises ever more slowly, by no more than this share, may rise as much again: theta has room for it.  One
+#: that fell by more than the second share, where no eigenvalue is below 0, is of no symmetric linear map.
+RISING, FALLS = 0.2, 0.02
+
+#: Iterates come back where they differ by no more than this share of a step.
+BACK = 0.03
+
 #: Two images of one iterate that are further apart, over its residual, leave no eigenvalue.
 LOUD = 0.1
 
@@ -73,7 +80,9 @@ class Vectors(Evidence, Value):
 
     Eigenvalues are read from the ``used`` iterates: the last ones whose images have the same entries 0, where these are
     FEWEST or more.  ``spectrum`` has ``ritz``, the Ritz values less 1, and modes between them; ``course`` is the
-    largest lambda after fewer iterates, and after all.  An end is found if it no longer changes with more
+    largest lambda after fewer iterates, and after all; ``loaded`` is True where a node that is open in the last image
+    bore a force in an iterate, so that its mode, lambda = 0, has a share in the error; ``period`` is the number of
+    steps after which iterates come back, 0 where they do not.  An end is found if it no longer changes with more
     directions: the least one as the exchanged roles need it, in 1 + 1/lambda, and the largest one in 1 + lambda.
     """
 
@@ -112,11 +121,13 @@ class Vectors(Evidence, Value):
     low_found: bool = key("false while 1 + 1/lambda of the least eigenvalue changes with every iterate")
     high_found: bool = key("false while the largest eigenvalue does: then no theta follows")
     course: tuple[float, ...]
+    loaded: bool
+    period: int
 
     @cached_property
     def seen(self) -> Spectrum:
-        """The spectrum, with a mode for open nodes unless nothing opens."""
-        return self.spectrum if self.linear else self.spectrum.with_open_nodes()
+        """The spectrum, with a mode for open nodes where one of them bore a force."""
+        return self.spectrum.with_open_nodes() if self.loaded and not self.linear else self.spectrum
 
     @property
     def linear(self) -> bool:
@@ -136,14 +147,17 @@ class Vectors(Evidence, Value):
         return (Role(neumann_body=None, rho=rho, spectrum=self.seen, reason=reason, level="bounded"),)
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
-        """In the roles of the run and exchanged.
+        """In the roles of the run and exchanged; in these roles where no theta converges, which leaves IQN-ILS.
 
         While the largest eigenvalue is not found only exchanged, where the least one is: their largest eigenvalue is
         one over the least of these roles; their least one may be any down to 0.
         """
+        if self.negative and not (self.kind.signed or self.kind.parallel):
+            return self.rows_on(self.spectrum, None, theta=1 / float(np.abs(1 + self.spectrum.values).max()))
+        low_found = self.low_found and self.linear
         if not roles or self.high_found:
-            return self.on_estimates(self.seen, "vectors", low_found=self.low_found) if roles else ()
-        if not self.low_found or self.seen.low - self.seen.error_low <= 0:
+            return self.on_estimates(self.seen, "vectors", low_found=low_found) if roles else ()
+        if not low_found or self.seen.low - self.seen.error_low <= 0:
             return ()
         role = self.estimated(self.seen.exchanged().with_open_nodes(), "vectors")
         return self.in_role(role, tied=True, exchanged=True)
@@ -157,9 +171,15 @@ class Vectors(Evidence, Value):
             return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.high_found:
             return ""
-        said = "rho is not found yet: these are too few independent directions"
-        if len(self.course) > 1:
-            said = f"rho changes with every iterate ({', '.join(f'{high:.3g}' for high in self.course)}), not found yet"
+        said, course = "rho is not found yet: these are too few independent directions", self.course
+        tops = ", ".join(f"{high:.3g}" for high in course)
+        if self.kind.signed and falls(course):
+            causes = (
+                "noise or a memory of the solvers, as one iterate given twice shows, or a solver that is not linear"
+            )
+            return f"more iterates show a smaller rho ({tops}), as of no linear symmetric coupling: {causes}"
+        if len(course) > 1:
+            said = f"rho changes with every iterate ({tops}), not found yet"
         return f"{said}; continue the run with IQN-ILS, and give more of its vectors"
 
     @property
@@ -168,6 +188,12 @@ class Vectors(Evidence, Value):
         if (self.apart or 0.0) > LOUD:
             share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
             return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
+        if self.period:
+            causes = (
+                self.kind.given("contact that opens and closes, ") + "solvers that are not linear, or a limit of theta"
+            )
+            rather = f"{causes}; IQN-ILS, another start or exchanged roles decide more than a smaller theta"
+            return f"no progress: the iterates come back after {self.period} steps, which these make: {rather}"
         if self.kind.parallel and (self.noise or 0.0) > 1:
             needed = "needed both fields in a row, their images likewise, and solvers with less noise"
             return f"images do not follow from the other field: {needed}"
@@ -191,7 +217,13 @@ class Vectors(Evidence, Value):
 
 
 def seen_in(
-    X: Floats, TX: Floats, *, kind: Kind = CONTACT, starts: NDArray[np.bool_] | None = None, changed: bool = False
+    X: Floats,
+    TX: Floats,
+    *,
+    kind: Kind = CONTACT,
+    starts: NDArray[np.bool_] | None = None,
+    changed: bool = False,
+    bore: NDArray[np.bool_] | None = None,
 ) -> Vectors:
     """The spectrum by Ritz values: iterates x and their images T x as rows, of a run by any method.
 
@@ -211,6 +243,8 @@ def seen_in(
         Where another step in time begins, with another T of the same linear part.
     changed : bool
         Whether nodes opened or closed before these iterates.
+    bore : array of bool, shape (n,), optional
+        The entries that were not 0 before these iterates.
 
     Raises
     ------
@@ -219,6 +253,7 @@ def seen_in(
     """
     given, last = len(X), len(X) if kind.linear else last_piece(TX)
     changing, read = last < given, last if last >= FEWEST else given
+    loaded = bool((at_zero(TX)[-1] & (bears(X, TX) | (bore is not None and bore))).any())
     X, TX = X[-read:], TX[-read:]
     inside = np.ones(read - 1, dtype=bool) if starts is None else ~starts[-read + 1 :]
     unknowns = X.shape[1] // (1 + kind.parallel)
@@ -230,11 +265,16 @@ def seen_in(
     modes = _modes(values, residuals / np.maximum(sizes, RANK * sizes.max()), unknowns)
     spectrum = Spectrum(values=modes - 1, source="vectors", error_low=low, error_high=high)
     before = _before(X, TX, inside, len(values), kind)
-    steady = lambda ends: len(before) > 0 and max(ends) <= (1 + STEADY) * min(ends)
+    steady = lambda ends, within=STEADY: len(before) > 0 and max(ends) <= (1 + within) * min(ends)
     whole = len(values) == unknowns
     known = [whole or bool(residuals[i] <= INVARIANT * abs(values[i])) for i in (0, -1)]
     tops = [float(found[-1].real) for found in (*before, values)]
     least = [float(found[0].real) - 1 for found in (*before, values)]
+    course = tuple(top - 1 for top in tops)
+    slows = len(tops) > FEWER and 0 <= tops[-1] - tops[-2] <= tops[-2] - tops[-3]
+    rises = slows and not steady(tops) and steady(tops, RISING) and (spectrum.real or not kind.signed)
+    if rises and not known[1]:
+        spectrum = replace(spectrum, error_high=max(high, tops[-1] - tops[0]))
     return Vectors(
         kind=kind,
         unknowns=unknowns,
@@ -249,9 +289,16 @@ def seen_in(
         noise=noise,
         apart=_apart(X, TX, inside),
         low_found=min(least) > 0 and (known[0] or steady([1 + 1 / one for one in least])),
-        high_found=known[1] or steady(tops),
-        course=tuple(top - 1 for top in tops),
+        high_found=known[1] or ((steady(tops) or rises) and not (kind.signed and falls(course))),
+        course=course,
+        loaded=loaded,
+        period=_period(X),
     )
+
+
+def falls(course: Sequence[float]) -> bool:
+    """True if the largest eigenvalue falls with more iterates, which it does not where T is linear and symmetric."""
+    return 1 + max(course) > (1 + FALLS) * (1 + course[-1])
 
 
 def _before(X: Floats, TX: Floats, inside: NDArray[np.bool_], directions: int, kind: Kind) -> list[Complex]:
@@ -370,11 +417,28 @@ def _apart(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> float | None:
     return max(shares, default=None)
 
 
+def _period(X: Floats) -> int:
+    """The least number of steps after which the last iterates come back, over four periods; 0 where they do not."""
+    step = float(np.linalg.norm(X[-1] - X[-2]))
+    back = lambda p: step > 0 and bool((np.linalg.norm(X[p:] - X[:-p], axis=1)[-3 * p :] <= BACK * step).all())
+    return next((p for p in range(2, (len(X) - 1) // 4 + 1) if back(p)), 0)
+
+
 def last_piece(TX: Floats) -> int:
     """Number of the last images with the same entries 0."""
-    zero = np.abs(TX) <= OPEN * float(np.abs(TX).max(initial=0.0))
+    zero = at_zero(TX)
     same = (zero == zero[-1]).all(axis=1)
     return len(TX) if same.all() else int(np.argmin(same[::-1]))
+
+
+def at_zero(rows: Floats) -> NDArray[np.bool_]:
+    """Entries that are 0, by rounding: in contact the forces of open nodes."""
+    return np.asarray(np.abs(rows) <= OPEN * float(np.abs(rows).max(initial=0.0)))
+
+
+def bears(X: Floats, TX: Floats) -> NDArray[np.bool_]:
+    """Entries that are not 0 in one of the iterates, or of their images."""
+    return np.asarray(~(at_zero(X) & at_zero(TX)).all(axis=0))
 
 
 def _modes(values: Complex, shares: Floats, unknowns: int) -> Complex:

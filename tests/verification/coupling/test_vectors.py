@@ -1,5 +1,6 @@
 """What iterates and their images show of the spectrum of a coupling."""
 
+import math
 import pickle
 
 import numpy as np
@@ -10,8 +11,9 @@ from linear_couplings import Linear, strips
 from strategies import AT_NIGHT
 
 import verification as vf
+from verification.coupling.methods import steps
 from verification.coupling.spectrum import Spectrum
-from verification.coupling.vectors import seen_in
+from verification.coupling.vectors import falls, seen_in
 from verification.registry import RULES
 
 
@@ -196,13 +198,19 @@ def test_contact_that_opens_and_closes_is_recognised():
         found[theta] = vf.advise_vectors([s.g for s in states], [s.image for s in states])
     assert [found[theta].vectors.changing for theta in found] == [False, True]
     assert [found[theta].vectors.used for theta in found] == [8, 6]
-    assert found["0.6"].spectrum.low == 0 < found["0.3"].spectrum.low
+    assert found["0.6"].spectrum.low > 0  # the node that is open bore no force: it has no error
     assert not found["0.6"].tied
+    assert not any(row.exchanged for row in found["0.6"].methods)
     closed = found["0.3"].spectrum.high
     assert found["0.6"].spectrum.high == pytest.approx(closed, rel=0.05)
     assert closed <= vf.measure(lifted).rho_normal.value * 1.001
     assert all(each.theta <= 2 / (1 + closed) for each in found.values())
-    assert "open nodes as well" in str(found["0.6"].sections())
+    assert "bear no force in any" in str(found["0.6"].sections())
+    given = [[s.g for s in states], [s.image for s in states]]
+    given[0][0] = given[0][0] + 1e-3 * np.abs(given[1][0]).max()
+    loaded = vf.advise_vectors(*given)
+    assert loaded.spectrum.low == 0  # a force where a node is open in the end has an error of its own
+    assert "open nodes as well" in str(loaded.sections())
 
 
 def test_four_iterates_after_contact_has_changed_are_enough_and_are_the_last_ones():
@@ -259,9 +267,22 @@ def test_a_mode_of_open_nodes_is_exact_and_is_added_once():
     assert more.with_open_nodes() is more
 
 
-@pytest.mark.parametrize(("low", "least"), [(0.5, 0.3), (0.1, 0.0), (-0.3, -0.5)])
+@pytest.mark.parametrize(("low", "least"), [(0.5, 0.3), (0.1, 0.0), (-0.3, -0.5), (-0.9, -0.9)])
 def test_theta_has_room_for_the_errors_of_both_ends_but_an_end_above_0_stays_there(low, least):
-    assert estimated(low, 4.0, 0.2, 0.4).theta == pytest.approx(2 / (2 + least + 4.4))
+    """Both ends arrive after as many steps, from equal errors: their residuals are 1 + lambda times these."""
+    theta = estimated(low, 4.0, 0.2, 0.4).theta
+    counts = [math.log((1 + end) / 1e-6) / -math.log(abs(1 - theta * (1 + end))) for end in (least, 4.4)]
+    assert counts[0] == pytest.approx(counts[1])
+    assert 1 / 5.4 < theta < 2 / (2 + least + 4.4)
+
+
+@pytest.mark.parametrize("high", [3.0, 30.0, 300.0])
+def test_theta_of_an_estimate_takes_hardly_more_than_the_fewest_steps(high):
+    one = estimated(0.1, high, 0.0, 0.0)
+    fewest = min(steps(one, "constant", one.theta * (1 + k / 1000)) or 10**9 for k in range(-60, 60))
+    assert steps(one, "constant", one.theta) <= 1.03 * fewest + 1
+    if high >= 30:  # the stiff mode's residual is 30 times its error
+        assert steps(one, "constant", 2 / (2.1 + high)) >= 1.15 * fewest
 
 
 @pytest.mark.parametrize("values", [[1 + 2j, 1 - 2j], [0.1 + 1j, 0.1 - 1j, 3.0], [0.0, 0.5 + 0.4j, 0.5 - 0.4j]])
@@ -333,3 +354,29 @@ def test_exchanged_roles_are_advised_only_where_the_least_eigenvalue_is_found():
     whole = vf.advise_vectors(*few.run("constant", 0.15, 6), kind="tied")
     assert whole.vectors.low_found
     assert any(row.exchanged for row in whole.methods)
+
+
+def test_iterates_that_come_back_are_no_progress_and_leave_no_theta():
+    """Saturating solvers at theta = 1/2: two iterates alternate, and their mode would be 2/theta - 1 = 3."""
+    X, TX, x = [], [], np.linspace(1.0, 2.0, 5)
+    for _ in range(12):
+        X.append(x)
+        TX.append(-4 * np.tanh(3 * x))
+        x = (x + TX[-1]) / 2
+    found = vf.advise_vectors(X, TX, kind="tied")
+    assert (found.vectors.period, found.theta, found.method) == (2, None, None)
+    assert "no progress: the iterates come back after 2 steps" in found.why_no_theta
+    assert Linear([0.5, 2.0]).run("constant", 0.5, 12) is not None
+    assert vf.advise_vectors(*Linear([0.5, 2.0]).run("constant", 0.5, 12)).vectors.period == 0
+
+
+def test_where_no_theta_converges_the_method_that_does_is_named():
+    found = vf.advise_vectors(*Linear([-1.6, -0.5, 0.3, 2.0]).run("iqn-ils", 0.2, 6), kind="general")
+    assert found.theta is None
+    assert found.method.name == "iqn-ils"
+    assert "WHICH METHOD?" in str(found.sections())
+
+
+def test_a_largest_eigenvalue_that_falls_with_more_iterates_is_of_noise_or_no_linear_solver():
+    assert falls((36.1, 29.0, 31.6))
+    assert not falls((1.0, 1.2, 1.19))
