@@ -17,6 +17,9 @@ from itertools import pairwise
 #: A ratio has not wholly settled: by this share of its distance from 1 it may be wrong, and one above 1 by this share.
 SETTLED = 0.03
 
+#: Growth bounds the stiffest mode from below; where ratios vary by this factor at most it is an estimate, too.
+GROWS = 1.01
+
 #: A theta is recommended where it takes at most so many times the fewest steps, wherever the ends may lie.
 DEAR = 1.4
 

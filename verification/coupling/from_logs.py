@@ -11,17 +11,16 @@ from typing import Any
 
 from ndtheory import HypothesisError
 from ndtheory.constants import SMALLEST, take
-from ndtheory.energy_norms import predicted_rate, predicted_theta
+from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import below
 from verification.coupling import ends, general
 from verification.coupling.accelerated import after_accelerated, seen_accelerated, spectrum_of
 from verification.coupling.advice import Advice
-from verification.coupling.ends import DEAR, SETTLED, Box
+from verification.coupling.ends import DEAR, GROWS, SETTLED, Box
 from verification.coupling.kinds import CONTACT, LARGEST_TO_PASTE, Kind, kind_of
 from verification.coupling.log_files import Log, read_log
 from verification.coupling.pace import CONVERGED, RELATIVE, Pace
 from verification.coupling.readings import (
-    SHORTEST_STEP,
     NextRun,
     Observed,
     RunReading,
@@ -35,7 +34,7 @@ from verification.coupling.readings import (
     rounded_down,
     steps_needed,
 )
-from verification.coupling.runs import Logs, decided
+from verification.coupling.runs import LARGE, Logs, decided
 from verification.coupling.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
 from verification.coupling.seen import (
     AGREE,
@@ -51,9 +50,6 @@ from verification.problem.tables import ProblemError
 
 #: Readings that are left, the run to make next, and rho where the logs decide it.
 Decision = tuple[tuple[RunReading, ...], NextRun, Fraction | None]
-
-#: Where the bounds of rho differ by less, a theta between costs a few steps at most.
-NARROW = Fraction(5, 4)
 
 #: What a log without its factor may be of.
 UNNAMED = (
@@ -71,8 +67,8 @@ STAYS = "a quarter of {}, which does not converge; the log of that run narrows r
 WINDOWS = "windows show no ratio one by one; their second halves have a ratio of {} together"
 
 #: A window too short to be read does not converge where it has FEW steps, and its last residual is this share of the
-#: largest one.
-LARGE, FEW = 0.9, 5
+#: largest one; a run is kept that converges within SHORT iterations without a ratio.
+HIGH, FEW, SHORT = 0.9, 5, 40
 
 #: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
 SMALLEST_THETA = Fraction(1, 10**6)
@@ -185,10 +181,10 @@ def advise_logs(
         return Advice.of(Logs(readings=(), rho=None, next=after_accelerated(spectrum, of), **known))
     interval = interval_of(*(([], []) if friction or not of.signed else bounds(seen, of)))
     if not of.signed:
-        steady = [(log.theta, log.slowest) for log in seen if not log.explodes]
-        boxes = [general.boxes_of(at, ratio) for at, ratio in steady if ratio is not None]
+        steady = [(log.theta, log.slowest, log.length) for log in seen if not log.explodes]
+        boxes = general.boxes_of([(at, ratio, steps) for at, ratio, steps in steady if ratio is not None])
         following, ends_seen = general.decide(boxes, made)
-        readings = () if ends_seen else next((log.readings for log in seen if log.readings), ())
+        readings = () if ends_seen and ends_seen.theta else next((log.readings for log in seen if log.readings), ())
         found = Logs(readings=readings, rho=None, next=following, spectrum=ends_seen, interval=interval, **known)
     else:
         readings, following, rho = with_friction(seen) if friction else decide(seen, interval, of)
@@ -292,16 +288,19 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
         vectors = "of such a run give the vectors to ndtheory advise vectors"
         return NextRun(theta=float(theta), why=f"{why}; {vectors}", again=True)
     if all(one.height < CONVERGED for one in paces):
-        return kept(theta, f"{_within(paces)}, and shows no ratio")
+        why = f"{_within(paces)}, and shows no ratio"
+        if all(one.length <= SHORT for one in paces):
+            return kept(theta, why)
+        return NextRun(theta=rounded_down((1 + theta) / 2), why=f"larger than {few(theta)}: there {why}")
     if any(one.lost for one in paces):
         why = "a quarter of it, as the residual runs away before a ratio shows"
         return NextRun(theta=rounded_down(theta / 4), why=why)
-    if all(one.kind == "short" and one.height > LARGE and one.steps >= FEW for one in paces):
+    if all(one.kind == "short" and one.height > HIGH and one.steps >= FEW for one in paces):
         why = "half of it, as the residual is about as large at the end of each window as ever"
         return NextRun(theta=rounded_down(theta / 2), why=why)
     if any(one.kind == "floor" for one in paces):
         reached = f"the residual stays at {max(one.height for one in paces):.0e} of its largest value"
-        why = f"the same again, with solvers that converge further: {reached} before a ratio shows"
+        why = f"the same again, with solvers that converge further: {reached} before a ratio shows, which may be noise"
         return NextRun(theta=float(theta), why=why, again=True)
     steps = f"{steps_needed(theta)} steps or more in one time window"
     again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
@@ -341,14 +340,14 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Deci
     elif rising:
         base = min(rising, key=lambda log: log.theta)
     else:
-        base = next((log for log in logs if log.readings), logs[0])
+        base = next((log for log in logs if log.readings), max(logs, key=lambda log: log.length))
     if interval.contradiction is not None:
         if kind.linear and falling:
             why = "it falls fastest; the logs contradict each other"
             return base.readings, kept(_steepest(falling)[1], why), None
         why = "half of the smallest theta, in one time window, with ResAbs in the log: the logs contradict each other"
         return base.readings, NextRun(theta=_half(logs), why=why), None
-    lo, hi, tied = interval.lo, interval.hi, kind.linear
+    lo, tied = interval.lo, kind.linear
     if (swift := next((log for log in logs if log.swift), None)) is not None and base.rho is None:
         why = f"{_within(swift.paces)}: there are few steps to gain"
         return swift.readings, kept(swift.theta, why), None
@@ -358,20 +357,7 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Deci
     if tied and (found := by_all()) is not None:
         return found
     if base.rho is not None:
-        return base.readings, fastest(falling, base.rho) or robust(logs, base.next), base.rho
-    if lo is not None and hi is not None and hi.value <= NARROW * lo.value:
-        rho = max(lo.value, hi.value)  # they may overlap a little
-        best = min(predicted_theta(rho), LARGEST_TO_PASTE)
-        why = f"the best one if rho is {few(rho)}, the upper end of what the logs leave"
-        if best > SHORTEST_STEP * base.theta:
-            return base.readings, NextRun(theta=rounded_down(best), why=why), None
-        if best > base.theta:
-            why = f"close to {few(best)}, {why}, and known to converge"
-        left = f"between {few(min(lo.value, hi.value))} and {few(rho)}"
-        says = f"the logs leave rho {left} if all of Gamma_c stays closed"
-        only = RunReading(kind="mode-high", value=float(rho), lo=below(lo.value), says=says)
-        following = NextRun(theta=rounded_down(min(best, base.theta)), why=why)
-        return (only,), fastest(falling, rho) or robust(logs, following), rho
+        return base.readings, robust(logs, base.next), base.rho
     if (found := by_all()) is not None:
         return found
     if not falling and len(rising) > 1:
@@ -380,19 +366,21 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Deci
         if lo is not None and predicted_theta(lo.value) < smaller:
             smaller, why = predicted_theta(lo.value), f"2/(2 + {few(lo.value)}), as none converges"
         return base.readings, NextRun(theta=rounded_down(smaller), why=why), None
-    return base.readings, between(base, rising), None
+    return base.readings, base.next, None
 
 
 def boxes_of(log: SeenLog, kind: Kind) -> list[Box]:
     """Limits of the ends of the spectrum by a log; in contact of the modes that are left near the solution."""
     ratio, plateau, theta, tied = log.slowest, log.plateau, float(log.theta), kind.linear
     left: list[Sequence[Box]] = []
-    if ratio is not None and (log.converges or (tied and ratio.least > 1)) and not log.explodes:
+    if ratio is not None and log.converges:
         left.append(ends.of_ratio(theta, float(ratio.least), float(ratio.most)))
     if tied and log.diverges:
         left.append(ends.of_stiffest(2 * (1 - SETTLED) / theta))
-    if tied and ratio is not None and log.explodes:
-        left.append(ends.of_stiffest((1 + float(ratio.least)) / theta))
+    if tied and ratio is not None and ratio.least > 1:
+        least, most = (1 + float(ratio.least)) / theta, (1 + float(ratio.most)) / theta
+        settled = most <= GROWS * least and not log.explodes
+        left.append(ends.of_stiffest(least, most * (1 + SETTLED) if settled else math.inf))
     if tied and plateau is not None:
         low, high = float(1 / (plateau.most - 1)), float(1 / (plateau.least - 1))
         left.append(ends.of_stiffest(1 + low * (1 - SETTLED), 1 + high * (1 + SETTLED)))
@@ -411,18 +399,21 @@ def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, kind:
         if falling := [log for log in logs if log.converges]:
             return base.readings, kept(_steepest(falling)[1], f"it falls fastest; {why}"), None
         return base.readings, NextRun(theta=_half(logs), why=f"half of the smallest theta; {why}"), None
-    if math.isinf(stiffest := max(box.b[1] for box in boxes)):
+    stiffest, rising = max(box.b[1] for box in boxes), [float(log.theta) for log in logs if log.diverges]
+    if math.isinf(stiffest):
         return None
+    grown = "; runs that grow bound rho from below, and its upper end is an estimate" * (tied and bool(rising))
     theta, dear = ends.cheapest(boxes, most if tied else float(base.theta))
     if dear <= DEAR:
         says = f"the logs together leave one reading: {ends_in_words(boxes)}; rho is taken at its upper end"
         only = RunReading(kind="mode-high", value=stiffest - 1, lo=None if lo is None else below(lo), says=says)
-        following = NextRun(theta=rounded_down(theta), why=cost_in_words(boxes, dear, kind))
+        following = NextRun(theta=rounded_down(theta), why=cost_in_words(boxes, dear, kind) + grown)
         return (only,), following, Fraction(stiffest) - 1
-    rising = [float(log.theta) for log in logs if log.diverges]
     theta = rounded_down(ends.telling(boxes, known, most if tied else min([most, *rising])))
-    unsure = f"no theta is sure to be within {DEAR:g} times the fewest steps"
-    why = f"a run there narrows rho: as long as {ends_in_words(boxes)}, {unsure}"
+    unsure = f"no theta is sure to be within {DEAR:g} times the fewest steps{grown}"
+    unsure += "; any constant theta is slow with so large a rho: take IQN-ILS" * (lo is not None and lo > LARGE)
+    run = f"a run of {steps_needed(Fraction(theta))} steps or more there narrows rho"
+    why = f"{run}: as long as {ends_in_words(boxes)}, {unsure}"
     return base.readings, NextRun(theta=theta, why=why), None
 
 
@@ -431,7 +422,8 @@ def ends_in_words(boxes: Sequence[Box]) -> str:
     within = []
     for which, limits in (("smallest", [box.a for box in boxes]), ("largest", [box.b for box in boxes])):
         low, high = (f"{max(z - 1, 0):.3g}" for z in (min(z for z, _ in limits), max(z for _, z in limits)))
-        within.append(f"the {which} eigenvalue is {low if low == high else f'{low} to {high}'}")
+        between = f"{low} or more" if high == "inf" else low if low == high else f"{low} to {high}"
+        within.append(f"the {which} eigenvalue is {between}")
     return " and ".join(within)
 
 
@@ -464,27 +456,3 @@ def robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
     theta, dear = ends.cheapest(boxes, best.theta)
     smaller = rounded_down(theta)
     return best if smaller >= best.theta else NextRun(theta=smaller, why=cost_in_words(boxes, dear, CONTACT))
-
-
-def fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:
-    """The theta of a log that falls faster than is predicted of the best one for rho; None where there is none.
-
-    The prediction is for the slowest mode that there may be: a softest mode well above 0 leaves a smaller theta faster.
-    """
-    ratio, theta = _steepest(falling)
-    if ratio >= predicted_rate(rho):
-        return None
-    predicted = f"{few(predicted_rate(rho))} is predicted of 2/(2 + rho) with rho = {few(rho)}"
-    return kept(theta, f"its log falls by {few(ratio)} a step or faster, where {predicted}")
-
-
-def between(base: SeenLog, rising: list[SeenLog]) -> NextRun:
-    """The next run of the log that decides most, below the thetas that do not converge."""
-    least = min((log.theta for log in rising), default=None)
-    if not base.converges or least is None or Fraction(base.next.theta) * SHORTEST_STEP <= least:
-        return base.next
-    low, high = float(base.theta), float(least)
-    if high <= low * float(SHORTEST_STEP):
-        return kept(base.theta, f"it converges and {high:.4g} does not: no larger one is worth a run")
-    theta = rounded_down((low * high) ** 0.5)
-    return NextRun(theta=theta, why=f"between {low:.4g}, which converges, and {high:.4g}, which does not")

@@ -20,6 +20,7 @@ from verification.coupling.readings import (
     read_parallel,
     rounded_down,
     spread,
+    steps_needed,
 )
 from verification.coupling.runs import OneRun, decided
 from verification.coupling.runs_with_friction import friction_bounds, next_with_friction, readings_with_friction
@@ -121,8 +122,10 @@ def advise_run(
     made = [Made(theta=t, falls=r < 1, rises=r >= 1, ratio=r) for t, r in each]
     known: dict[str, Any] = {"kind": of, "rubs": friction, "theta": t, "ratio": r}
     if not of.signed:
-        following, spectrum = general.decide([general.boxes_of(t, Observed.known(r)) for t, r in each], made)
-        readings = () if spectrum else general.readings_of(t, observed)
+        following, spectrum = general.decide(
+            general.boxes_of([(t, Observed.known(r), steps_needed(t)) for t, r in each]), made
+        )
+        readings = () if spectrum and spectrum.theta else general.readings_of(t, observed)
         known |= {"readings": readings, "earlier": tuple(each[:-1])}
         return Advice.of(OneRun(next=following, rho=None, spectrum=spectrum, **known))
     if len(each) > 1:

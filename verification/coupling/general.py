@@ -8,17 +8,18 @@ is below 0 no theta converges.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from verification.coupling import ends
-from verification.coupling.ends import DEAR, Box
+from verification.coupling import ends, readings
+from verification.coupling.ends import DEAR, GROWS, Box
 from verification.coupling.kinds import ANY_THETA
-from verification.coupling.readings import Made, NextRun, Observed, RunReading, few, kept, rounded_down, same_run
+from verification.coupling.readings import Made, NextRun, Observed, RunReading, few, rounded_down, same_run
 from verification.coupling.spectrum import Spectrum
 
-#: Modes close to the slowest one die out so slowly that a ratio may still rise by this share of its distance from 1.
-RISES = 0.1
+#: Modes close to the slowest one die out so slowly that a ratio may still rise by these shares of its distance from 1.
+RISES, LATEST = 0.1, 0.3
 
 #: A run to make has at most so many times the largest theta that falls: where it diverges it shows the largest lambda.
 FURTHER = 2.0
@@ -39,9 +40,21 @@ def readings_of(theta: Fraction, ratio: Observed) -> tuple[RunReading, ...]:
     )
 
 
-def boxes_of(theta: Fraction, ratio: Observed) -> tuple[Box, Box]:
-    """Limits of both ends by a run."""
-    return ends.of_ratio(float(theta), float(ratio.least), float(ratio.most), rises=RISES)
+def boxes_of(runs: Sequence[tuple[Fraction, Observed, int]]) -> list[tuple[Box, Box]]:
+    """Limits of both ends by each run; one that grows unsteadily has bounds only, if another falls.
+
+    Over n steps the slowest of dense modes stands out from the others up to 1/n: by that a ratio may still rise.
+    """
+    falls, each = any(ratio.most < 1 for _, ratio, _ in runs), []
+    for theta, ratio, steps in runs:
+        least, most = float(ratio.least), float(ratio.most)
+        late = 1 / (steps * (1 - most)) if most < 1 else 0.0
+        one, other = ends.of_ratio(float(theta), least, most, rises=min(max(RISES, late), LATEST))
+        if falls and least > 1 and most > GROWS * least:
+            one = Box(a=(-math.inf, one.a[1]), b=ends.ANYTHING.b)
+            other = Box(a=ends.ANYTHING.a, b=(other.b[0], math.inf))
+        each.append((one, other))
+    return each
 
 
 def decide(each: Sequence[Sequence[Box]], made: Sequence[Made]) -> tuple[NextRun, Spectrum | None]:
@@ -58,14 +71,16 @@ def decide(each: Sequence[Sequence[Box]], made: Sequence[Made]) -> tuple[NextRun
     if not each:
         return NextRun(theta=half, why="half of the smallest theta, until a ratio shows"), None
     least, most = min(box.a[0] for box in boxes), max(box.b[1] for box in boxes)
-    if all(box.a[1] <= 0 for box in boxes):
-        why = f"no constant theta above 0 converges: an eigenvalue is {few(max(box.a[1] for box in boxes) - 1)} or less"
-        return NextRun(theta=half, why=f"{why}, or a solver has the wrong sign; IQN-ILS may converge"), None
+    if (softest := max(box.a[1] for box in boxes)) <= 0:
+        why = f"no constant theta above 0 converges: an eigenvalue is {few(softest - 1)} or less"
+        why += ", or a solver has the wrong sign; IQN-ILS may converge"
+        return NextRun(theta=half, why=why), Spectrum.between(softest - 1, most - 1)
     if least <= 0:
+        theta = min(1 / most, 2 * half)
         why = "there no mode changes its sign: its ratio shows the least eigenvalue, or grows as for any theta"
-        return NextRun(theta=rounded_down(min(1 / most, 2 * half)), why=why), None
+        return readings.near(Fraction(theta), made, why), None
     theta, cost = ends.cheapest(boxes, float(ANY_THETA))
-    if cost <= DEAR:
+    if cost <= DEAR and falling:
         low, high = min(box.a[0] for box in boxes) - 1, most - 1
         why = (
             f"at most {max(cost, 1):.2g} times the fewest steps with lambda from {low:.3g} to {high:.3g}, by these runs"
@@ -77,7 +92,6 @@ def decide(each: Sequence[Sequence[Box]], made: Sequence[Made]) -> tuple[NextRun
     theta = ends.telling(boxes, known, below if len(made) > 1 else min(known))
     theta = min(theta, FURTHER * largest)
     if any(same_run(theta, one.theta) for one in made):
-        best = min(falling or made, key=lambda one: (one.ratio is None, one.ratio or 0))
-        return kept(best.theta, "no other theta is worth a run"), None
+        return readings.fastest_of(falling or made), None
     why = f"its ratio shows the other end: lambda is from {least - 1:.3g} to {most - 1:.3g} by the runs so far"
     return NextRun(theta=rounded_down(theta), why=why), None

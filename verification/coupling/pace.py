@@ -71,7 +71,8 @@ class Pace:
     steady steps before.  ``steps`` of ``length`` residuals can be read.  ``height`` is the last one as a share of the
     largest; where it is lost in rounding or zero, the share of rounding.  The series is ``lost`` if it ends in inf or
     nan, has ``arrived`` if it ends in rounding or zero, a step after those that can be read, and ``adapts`` if it falls
-    much faster than before after it rose: a constant factor does not do that.
+    much faster than before after it rose: a constant factor does not do that.  Of a level that repeats itself
+    ``period`` is the number of steps after which it does.
     """
 
     kind: Kind
@@ -84,6 +85,7 @@ class Pace:
     lost: bool = False
     arrived: bool = False
     adapts: bool = False
+    period: int = 0
 
     @property
     def swift(self) -> bool:
@@ -189,7 +191,7 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
             return before
         if before is not None and (kind == "floor" or before.grows):
             return replace(before, kind=kind)
-        return Pace(kind=kind, **known)
+        return Pace(kind=kind, period=_period(logs[-lengths[-1] - 1 :]), **known)
     if before is not None and before.grows:
         return before
     if height < CONVERGED and (settles := _settling(tail, relative, limit, steps)) is not None:
@@ -230,6 +232,12 @@ def _adapts(values: Floats) -> bool:
         return False
     before = np.maximum.accumulate(ratios)
     return bool(((before > 0) & (before - ratios > math.log(DROP))).any())
+
+
+def _period(logs: Floats) -> int:
+    """The least number of steps after which residuals repeat themselves three times; 0 where they do not."""
+    repeats = lambda p: float(np.abs(logs[p:] - logs[:-p])[-2 * p :].max()) <= FLAT
+    return next((p for p in range(1, len(logs) // 3 + 1) if repeats(p)), 0)
 
 
 def _slopes(logs: Floats, lag: int) -> Floats:

@@ -159,13 +159,20 @@ class Observed(Part):
 class Made:
     """A run that was made: its residual ``falls`` to the end of the log, or it ``rises``: it does not converge.
 
-    ``ratio`` is the ratio by which it falls or grows at most, None where it is not steady.
+    ``ratio`` is the ratio by which it falls or grows at most, None where it is not steady and the run did not arrive;
+    ``mean`` is its mean over all steps.
     """
 
     theta: Fraction
     falls: bool
     rises: bool = False
     ratio: Fraction | None = None
+    mean: float = 1.0
+
+    @property
+    def pace(self) -> float:
+        """The ratio, or the mean where it is not steady."""
+        return self.mean if self.ratio is None else float(self.ratio)
 
 
 def few(value: float | Fraction) -> str:
@@ -335,6 +342,25 @@ def kept(theta: Fraction, why: str) -> NextRun:
     return NextRun(theta=float(theta), why=why if why.startswith("keep it") else f"keep it: {why}", kept=True)
 
 
+def fastest_of(made: Sequence[Made]) -> NextRun:
+    """The fastest run, to be kept where its log shows that it is, or made again over more steps."""
+    best = min(made, key=lambda one: (one.pace, one.theta))
+    falls = f"it falls fastest of these runs, by {best.pace:.3g} a step"
+    if best.ratio is not None:
+        return kept(best.theta, falls)
+    return near(best.theta, made, f"{few(best.theta)} {falls[3:]} in the mean, and shows no steady ratio")
+
+
+def near(theta: Fraction, made: Sequence[Made], why: str) -> NextRun:
+    """A run at a theta, or a little below it where one was made there, over enough steps."""
+    given = theta
+    while any(same_run(theta, one.theta) for one in made):
+        theta *= Fraction(9, 10)
+    steps = 2 * steps_needed(theta)
+    below = "a little smaller, " * (theta < given)
+    return NextRun(theta=rounded_down(theta), why=f"{below}{steps} steps or more in one time window: {why}")
+
+
 def pasted_or_not(following: NextRun, made: Sequence[Made]) -> NextRun | None:
     """The theta to paste: kept where a run with it falls; None where it is not below all that do not converge."""
     low = min((one.theta for one in made if one.rises), default=None)
@@ -367,7 +393,6 @@ def anew(following: NextRun, made: Sequence[Made]) -> NextRun:
         theta = min(3 * low / 2, (1 + low) / 2) if SHORTEST_STEP * low < 1 else low
         why = f"larger than {few(low)}, which falls"
     if theta == low:
-        best = min(falling, key=lambda one: (one.ratio is None, one.ratio or 0, one.theta))
-        return kept(best.theta, "it falls, and no other theta is worth a run")
+        return fastest_of(falling)
     steps = f"{steps_needed(theta)} steps or more in one time window"
     return NextRun(theta=rounded_down(theta), why=f"{why}; give all logs together, the new one with {steps}")

@@ -47,7 +47,7 @@ class Runs(Evidence):
     """Runs of one coupling: possible ``readings``, bounds with friction, the ``next`` run, ``rho`` where it is decided.
 
     Where they do ``next`` is the theta to paste.  ``rubs`` is True if there is friction; ``spectrum`` lies between the
-    ends that the runs show, where they show both.
+    ends that the runs show, where they show both, or that no constant theta converges.
     """
 
     readings: tuple[RunReading, ...]
@@ -62,7 +62,7 @@ class Runs(Evidence):
 
     def spectra(self) -> tuple[Role, ...]:
         """The roles of the runs, where they decide rho or the spectrum."""
-        if self.spectrum is not None:
+        if self.spectrum is not None and self.spectrum.theta:
             return (self.estimated(self.spectrum, self.shows),)
         if self.rho is None:
             return ()
@@ -70,6 +70,9 @@ class Runs(Evidence):
 
     def methods(self, roles: Sequence[Role]) -> tuple[MethodRow, ...]:
         """For the theta to paste; on the spectrum, with the roles exchanged too, or by rho where only that is known."""
+        if self.spectrum is not None and not self.spectrum.theta:
+            rows = self.rows_on(self.spectrum, None, theta=1 / (1 + max(self.spectrum.high, 0.0)))
+            return tuple(replace(row, bound="at least") for row in rows)
         if self.spectrum is not None:
             return self.on_estimates(self.spectrum, self.shows)
         if not roles and (rho := self.least_rho or 0.0) > LARGE and not self.rubs:
@@ -106,6 +109,8 @@ class Runs(Evidence):
 
     @property
     def why_no_theta(self) -> str:
+        if self.spectrum is not None and not self.spectrum.theta:
+            return "no constant theta above 0 converges by these runs, or a solver has the wrong sign"
         if self.rho is not None or self.spectrum is not None:
             return ""
         if self.friction_bounds is not None:

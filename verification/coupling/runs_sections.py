@@ -26,6 +26,15 @@ from verification.show.parts import Cell, Note, Quantity, Section, Sections, Tab
 #: Columns of all logs together that are shown; the document holds every one.
 MOST_COLUMNS = 8
 
+#: What decides where a residual stays at a level: without friction, where nothing opens or slips, and with friction.
+STUCK = {
+    "contact": "without friction every theta below 2/(1 + rho) converges; if a smaller one does not, a solver has "
+    "noise or a memory, or there is friction",
+    "linear": "theta is at the limit of a mode; or a solver has noise or a memory, as two evaluations of one x show, "
+    "or is not linear, and then a smaller theta need not help",
+    "friction": "with friction a smaller theta need not help",
+}
+
 #: Words for kinds of residuals; the others are called by their names.
 RESIDUALS = {"assumed": "taken as absolute", "drop": "over the first or largest one", "previous": "over |x|"}
 
@@ -99,6 +108,11 @@ def of_logs(found: Logs) -> Sections:
         notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
     elif not read and not notes:
         notes.append("Nothing: residuals show rho only where the relaxation is constant.")
+    stuck = [log for log in found.logs if log.stays]
+    if stuck and not any(log.converges for log in found.logs):
+        at = ", ".join(f"{float(log.theta):.4g}" for log in stuck)
+        why = STUCK["friction" if found.rubs else "linear" if found.kind.linear else "contact"]
+        notes.append(f"No progress with theta = {at}: {why}. IQN-ILS, another start or exchanged roles may.")
     if found.logs and not found.decided and not found.next.kept:
         notes.append("A few vectors of a run decide more than its log: ndtheory advise vectors --help.")
     if found.interval.contradiction is not None:

@@ -16,7 +16,7 @@ from ndtheory.keys import says as means
 from ndtheory.number import above, below
 from verification.coupling.kinds import CONTACT, Kind
 from verification.coupling.log_files import Column, Log
-from verification.coupling.pace import MOST_WINDOWS, RELATIVE, Pace, pace, pooled, together
+from verification.coupling.pace import CONVERGED, MOST_WINDOWS, RELATIVE, Pace, pace, pooled, together
 from verification.coupling.readings import (
     FEWEST_STEPS,
     Made,
@@ -115,6 +115,7 @@ class SeenColumn(Part):
     def says(self) -> str:
         if len(self.paces) == 1:
             found = _WORDS[self.paces[0].kind]
+            found += f", a cycle of {self.paces[0].period} steps" * (self.paces[0].period > 1)
         else:
             counts = ((self.count(kind), words) for kind, words in _WORDS.items())
             found = f"of {self.windows} windows {', '.join(f'{n} {words}' for n, words in counts if n)}"
@@ -215,6 +216,11 @@ class SeenLog(Part):
         return [pace for column in self.columns for pace in column.paces]
 
     @property
+    def length(self) -> int:
+        """The most steps of a window."""
+        return max((pace.steps for pace in self.paces), default=0)
+
+    @property
     def slowest(self) -> Observed | None:
         """The ratio of the field which is slowest: a norm that does not see a mode falls faster."""
         found = [column.ratio for column in self.columns if column.ratio is not None]
@@ -295,7 +301,11 @@ class SeenLog(Part):
     def made(self) -> Made:
         """Data from which the next run is chosen."""
         most = None if self.slowest is None else self.slowest.most
-        return Made(theta=self.theta, falls=self.falls, rises=self.diverges, ratio=most)
+        means = [pace.height ** (1 / (pace.steps + pace.arrived)) for pace in self.paces if pace.steps]
+        mean = max(means, default=1.0)
+        if most is None and self.falls and all(pace.height < CONVERGED for pace in self.paces):
+            most = Fraction(mean)
+        return Made(theta=self.theta, falls=self.falls, rises=self.diverges, ratio=most, mean=mean)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -113,7 +113,9 @@ def test_where_a_run_was_made_the_next_one_lies_in_the_gap_above_those_that_fall
     assert again(0.4, fell("0.1"), stayed("0.4"), stayed("0.9")).theta == 0.2
     assert again(0.1, fell("0.1")).theta == 0.15
     assert again(0.8, fell("0.8")).theta == 0.9
-    assert again(0.95, fell("0.95")).kept  # no room up to 1
+    assert again(0.95, fell("0.95", F(1, 2))).kept  # no room up to 1
+    slow = again(0.95, fell("0.95"))  # of which no log shows that it is the fastest
+    assert (slow.kept, slow.theta < 0.95, "no steady ratio" in slow.why) == (False, True, True)
     longer = NextRun(theta=0.1, why="the same again", again=True)
     assert anew(longer, [stayed("0.1"), stayed("0.1")]) is longer
     assert anew(longer, [stayed("0.1"), stayed("0.2")]).theta == 0.05
