@@ -38,11 +38,7 @@ OF_SIZE = f"of a size between 1e-{LARGEST_EXPONENT} and 1e{LARGEST_EXPONENT}"
 
 
 def typed(value: object) -> str:
-    """A value as a user would type it: numbers in 12 digits, fractions that are no decimals as such.
-
-    >>> typed(0.1 + 0.2), typed(Fraction(3, 10)), typed(Fraction(1, 3)), typed(12.0)
-    ('0.3', '0.3', '1/3', '12.0')
-    """
+    """A value as a user would type it: numbers in 12 digits, fractions that are no decimals as such."""
     if isinstance(value, int) and value.bit_length() > 1000:
         return f"an integer of {value.bit_length()} bits"
     if isinstance(value, Fraction):
