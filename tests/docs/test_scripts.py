@@ -40,6 +40,11 @@ def test_a_script_is_short_and_has_its_text_and_its_picture(path):
     assert faults(path.stem, path.read_text("utf-8")) == []
 
 
+def test_the_run_in_five_lines_has_five_lines():
+    below = (DOCS / "scripts" / "first" / "five_lines.py").read_text("utf-8").rpartition('"""')[2]
+    assert len([line for line in below.splitlines() if line]) == 5
+
+
 GOOD = '"""\nTwo\n===\n\nIt is two.\n"""\n\nfigure = draw(1 + 1)\nassert figure\nfigure.savefig("two.png")\n'
 
 

@@ -3,7 +3,7 @@ A rule of your own
 ==================
 
 A relaxation rule is a class with one method that returns the next force. This one halves theta
-whenever the residual grows. It starts from 0.9, with which the run of two bars never ends, and the
+whenever the residual grows. It starts from 0.9, with which the run of two bars stalls, and the
 run converges. The picture shows that its last theta has the rate 0.8.
 """
 

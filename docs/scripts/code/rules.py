@@ -3,8 +3,8 @@ Rules of relaxation, side by side
 =================================
 
 With the forces on the soft plate a constant theta takes many steps. Aitken's rule and Anderson's
-take fewer, and Newton's the fewest, but each of its steps also needs a derivative. Only the constant
-theta has a proof that it converges.
+take fewer, and Newton's the fewest, but each of its steps also needs a derivative. No theorem covers
+these three rules.
 """
 
 from matplotlib.figure import Figure

@@ -3,7 +3,7 @@ Where is contraction proved?
 ============================
 
 In the plane of theta and friction, the theorem in energy norms proves that all runs of the plates
-converge inside this region. It ends at one friction coefficient, the tip, above which it proves
+on this mesh converge inside this region. It ends at one friction coefficient, the tip, above which it proves
 nothing for any theta.
 """
 

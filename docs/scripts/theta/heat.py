@@ -3,7 +3,7 @@ Heat through two walls
 ======================
 
 Steel beside insulation: the same theory advises couplings of heat. In the advised roles almost no
-relaxation is needed, as insulation cannot keep steel from its temperature. The picture has
+relaxation is needed, as insulation hardly changes the temperature of the steel. The picture has
 the advised theta over the conductivity of the second wall.
 """
 
