@@ -53,7 +53,7 @@ def describe(app: Sphinx, page: str, template: str, context: dict[str, Any], doc
     context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
     if doctree is None:
         return
-    title = nodes.Text(re.sub(r"<[^>]+>", "", context["title"])).astext()
+    title = re.sub(r"<[^>]+>", "", context["title"]).replace('"', "&quot;")
     tags = {"og:title": title, "og:type": "article", "og:site_name": app.config.project}
     if said := description(doctree):
         tags |= {"description": escape(said), "og:description": escape(said)}

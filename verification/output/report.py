@@ -57,7 +57,7 @@ class _Raised(str):
     """HTML of a text with its powers raised and the index of Gamma_c lowered, which jinja2 takes as it is."""
 
     def __new__(cls, text: object) -> _Raised:
-        powers = re.sub(r"\^(-?\d+(?:\.\d+)?)", r"<sup>\1</sup>", escape(str(text)))
+        powers = re.sub(r"(?<=\w)\^(-?\d+(?:\.\d+)?)", r"<sup>\1</sup>", escape(str(text)))
         return super().__new__(cls, powers.replace("Gamma_c", "Γ<sub>c</sub>"))
 
     def __html__(self) -> str:
