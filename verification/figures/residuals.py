@@ -14,7 +14,7 @@ from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
 from verification.comparison import Comparison
 from verification.figures.bodies import draw_bodies
-from verification.figures.style import NORM, PRESSURE, legend_beside, mark_unfinished, new_figure, plain, styled
+from verification.figures.style import PRESSURE, legend_beside, mark_unfinished, new_figure, norm, plain, styled
 from verification.registry import BOUNDS, draw
 
 
@@ -42,7 +42,7 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
             floor = noise(run.pair, run.last) / run.last.scale
             ax.axhline(floor, color="0.55", linewidth=0.8, linestyle=":", label="rounding")
         ax.axhline(run.pair.settings.tolerance, color="0.2", linewidth=0.8, linestyle=":", label="tolerance")
-        ax.set(xlabel="evaluations of T", ylabel=f"residual {NORM('T g - g')}, relative to the forces")
+        ax.set(xlabel="evaluations of T", ylabel=f"residual {norm('T g - g')}, relative to the forces")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}")
         legend_beside(ax)

@@ -40,9 +40,6 @@ OUTCOMES = {
 #: The axis of theta.
 THETA = "relaxation factor theta"
 
-#: The norm (5.21) of a force, as mathematics.
-NORM = r"$|\!|\!|{}|\!|\!|$".format
-
 #: Digits of an exponent.
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -78,6 +75,11 @@ def styled() -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams.update(PARAMETERS)
         yield
+
+
+def norm(inside: str) -> str:
+    """The norm (5.21) of a force, as mathematics."""
+    return rf"$|\!|\!|{inside}|\!|\!|$"
 
 
 def ink(fill: str) -> str:

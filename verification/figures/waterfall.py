@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from ndtheory.statements import statements
 from verification.bounds.losses import Loss, Losses
 from verification.bounds.table import Printed, Repaired
-from verification.figures.style import NORM, STATES, new_figure, styled
+from verification.figures.style import STATES, new_figure, norm, styled
 
 #: The change of T in the energy norm.
-CHANGE = NORM(r"T\psi-T\tilde\psi")
+CHANGE = norm(r"T\psi-T\tilde\psi")
 
 #: The inequalities between squares of norms.
 SQUARED = ("(5.29)", "(5.38)")
