@@ -11,7 +11,7 @@ BESIDE = {tokenize.COMMENT, tokenize.NL}
 LAYOUT = {tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 #: Lines and tokens of code of the three packages together at most; comments, docstrings and layout are no tokens.
-LINES, TOKENS = 58_700, 429_500
+LINES, TOKENS = 59_150, 432_700
 
 #: Lines of each package at most, those of packages inside it apart: a tenth more than it has.
 BUDGET = {
@@ -24,7 +24,7 @@ BUDGET = {
     "verification.cli": 2800,
     "verification.constants": 1050,
     "verification.contact": 1100,
-    "verification.coupling": 8700,
+    "verification.coupling": 8800,
     "verification.exploration": 850,
     "verification.figures": 1800,
     "verification.free_norm": 1750,
@@ -34,7 +34,7 @@ BUDGET = {
     "verification.output": 650,
     "verification.problem": 2700,
     "verification.reproduce": 800,
-    "verification.sections": 1000,
+    "verification.sections": 1050,
     "verification.semidefinite": 3350,
     "verification.show": 450,
     "verification.sweeps": 2950,

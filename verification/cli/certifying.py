@@ -73,7 +73,7 @@ def certify(
     It is proved on the meshes of FILE, or with --continuum without a mesh.
 
     The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Anyone
-    can check it with a script of 350 lines, verification/certificate/check.py, which imports nothing of this
+    can check it with a script of under 400 lines, verification/certificate/check.py, which imports nothing of this
     program (only python-flint, for interval arithmetic).  Exit 1 where contraction is not proved.
 
     \b
