@@ -260,6 +260,24 @@ def test_thetas_are_for_the_logs_that_need_one(call, log, tmp_path):
     assert len(found["accelerated"]) == 1
 
 
+@pytest.mark.parametrize("first", ["names its factor", "names Aitken"])
+@pytest.mark.parametrize("digits", ["0.1637", "0.2"])
+def test_the_call_that_the_last_line_asks_for_is_taken(call, tmp_path, first, digits):
+    lines = {"names its factor": "factor (fixed): 0.5", "names Aitken": "factor (Aitken): 0.1{0}"}
+
+    def log(name, line):
+        steps = [
+            f"Time = 1, iteration: {k}\nCurrent fsi under-relaxation {line.format(k)}\n"
+            f"Current fsi relative residual norm: {0.7**k:.6g}\n"
+            for k in range(1, 30)
+        ]
+        return written(tmp_path / name, "".join(steps))
+
+    logs = ["--log", log("log.one", lines[first]), "--log", log("log.two", f"factor (fixed): {digits}")]
+    found = call("advise", "run", *logs, "--theta", digits, "--json").document
+    assert [seen["theta"] for seen in found["logs"]][-1] == float(digits)
+
+
 def test_windows_that_end_where_they_were_largest_ask_for_a_smaller_theta(call, tmp_path):
     grows = [0.02 * 1.3**n for n in range(10)]
     file = precice(tmp_path / "a.log", [{"ResAbs(M:Force)": grows}] * 3)

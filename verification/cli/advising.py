@@ -338,15 +338,19 @@ def run(
 
 
 def _thetas_of(logs: Sequence[Path], thetas: Sequence[str], form: Mapping[str, Any]) -> Sequence[str | None]:
-    """The theta of each log; fewer than logs are for those whose relaxation was constant and that name no factor."""
+    """The theta of each log; fewer than logs are for those that need one, then for the last that name their factor."""
     if not thetas or len(thetas) >= len(logs):
         return thetas or (None,) * len(logs)
     from verification.coupling.log_files import read_log
 
     read = [read_log(path, **form) for path in logs]
-    wanted = [log.accelerator is None and log.theta is None for log in read]
-    left = iter(thetas)
-    return [next(left) if needed else None for needed in wanted] if sum(wanted) == len(thetas) else thetas
+    needy = [k for k, log in enumerate(read) if log.needs_theta]
+    naming = [k for k, log in enumerate(read) if log.accelerator is None and not log.needs_theta]
+    spare = len(thetas) - len(needy)
+    if not 0 <= spare <= len(naming):
+        return thetas
+    given = dict(zip(sorted([*needy, *naming[len(naming) - spare :]]), thetas, strict=True))
+    return [given.get(k) for k in range(len(logs))]
 
 
 #: Words of --shape, and the parameters of advise_moduli that they set.

@@ -203,7 +203,7 @@ def _theta_of(log: Log, theta: Fraction | None) -> Fraction:
     """The theta that was given for a log, or that it names in all its digits."""
     if theta is not None:
         return theta
-    if log.theta is None or log.theta_rounding > 1e-3 * log.theta:
+    if log.needs_theta:
         raise HypothesisError("theta", None, f"the relaxation factor of {log.path}, which does not name it ({UNNAMED})")
     return Fraction(repr(log.theta))
 

@@ -75,6 +75,11 @@ class Log:
     counts: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
 
+    @property
+    def needs_theta(self) -> bool:
+        """True if the relaxation was constant and the log does not name its factor, or names it in few digits."""
+        return self.accelerator is None and (self.theta is None or self.theta_rounding > 1e-3 * self.theta)
+
 
 def read_log(path: Path, pattern: str | None = None, *, name: str | None = None, log10: bool = False) -> Log:
     """Read the residuals in a log, by its form, by the name of a format, or by a regular expression.
