@@ -12,8 +12,14 @@ from typing import Any
 import numpy as np
 from processes import PATIENCE, environment
 
+import verification as vf
+from verification.coupling.snippets import CouplingScheme, snippet
+
 #: The wrapper of a contact body, :mod:`kratos_contact`, is loaded from here.
 HERE = Path(__file__).parent
+
+#: With friction the models are tied, as the table of ``advise --tied`` has it.
+PLATES = vf.example("section6").changed(cells=((20, 3), (12, 3)))
 
 
 def mdpa(body) -> str:
@@ -129,3 +135,13 @@ def run(file: Path) -> str:
     done = subprocess.run(command, cwd=file.parent, env=env, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     return done.stdout
+
+
+def coupled(folder, problem, theta, method="constant", accelerator=None, steps=50, **members) -> str:
+    """What Kratos prints of a coupling with the roles of a problem, its models and its snippet.
+
+    The snippet leaves room for twice the ``steps``.
+    """
+    pair = vf.build(problem)
+    scheme = CouplingScheme(neumann_body=pair.neumann_body, theta=theta, steps=steps, tied=pair.friction > 0)
+    return run(written(folder, pair, snippet("Kratos", scheme, method), accelerator, **members))

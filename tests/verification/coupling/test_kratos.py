@@ -9,17 +9,19 @@ from fractions import Fraction
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import kratos_models
+import kratos_runs
+import meshio
 import numpy as np
 import pytest
 from coupling_logs import contact_run, tied_run
+from kratos_models import PLATES, coupled
+from kratos_runs import ITERATION
 
 import verification as vf
 from verification.cli import main
 from verification.coupling.from_logs import advise_logs
 from verification.coupling.log_files import read_log
 from verification.coupling.methods import METHODS, steps
-from verification.coupling.snippets import CouplingScheme, snippet
 from verification.problem.specs import SidePart
 
 APPLICATIONS = ("CoSimulation", "StructuralMechanics", "ConstitutiveLaws", "Mapping", "LinearSolvers")
@@ -38,30 +40,12 @@ needs_kratos = pytest.mark.skipif(
     any(map(missing, WHEELS)), reason=f"no {', '.join(filter(missing, WHEELS))} here: `make kratos` runs these tests"
 )
 
-#: With friction the models are tied, as the table of ``advise --tied`` has it.
-PLATES = vf.example("section6").changed(cells=((20, 3), (12, 3)))
-
 #: Half of the top is pressed, without friction: some contact nodes open.
 HALF = SidePart(side="top", x=(Fraction(2, 5), Fraction(1)))
 PRESSED = replace(
     PLATES.changed(friction=0),
     body2=replace(PLATES.body2, parts={"half": HALF}, prescribed={"half": PLATES.body2.prescribed["top"]}),
 )
-
-#: Steps for which the snippets leave room, twice.
-ROOM_FOR = 50
-
-#: What CoSimulation prints once in each iteration.
-ITERATION = "Coupling iteration:"
-
-
-def coupled(folder, problem, theta, method="constant", accelerator=None, **members):
-    """What Kratos prints of a coupling with the roles of a problem, its models and its snippet."""
-    pair = vf.build(problem)
-    scheme = CouplingScheme(neumann_body=pair.neumann_body, theta=theta, steps=ROOM_FOR, tied=pair.friction > 0)
-    return kratos_models.run(
-        kratos_models.written(folder, pair, snippet("Kratos", scheme, method), accelerator, **members)
-    )
 
 
 def predicted(problem):
@@ -150,3 +134,41 @@ def test_the_vectors_that_Kratos_writes_by_the_block_of_the_page_give_theta(tmp_
     ends = role.rho_min.value, role.rho_tied.value
     assert (found.spectrum.low, found.spectrum.high) == pytest.approx(ends, rel=0.25)
     assert steps(role.spectrum, "constant", found.theta) <= 1.4 * steps(role.spectrum, "constant", role.theta_tied)
+
+
+@needs_kratos
+@pytest.mark.parametrize("name", kratos_runs.RUNS)
+def test_the_runs_of_the_page_take_the_iterations_of_their_logs(tmp_path, name):
+    printed = kratos_runs.cut(kratos_runs.printed(tmp_path, name))
+    logged = (kratos_runs.LOGS / f"{name}.log").read_text("utf-8")
+    assert abs(printed.count(ITERATION) - logged.count(ITERATION)) <= 1  # by rounding a residual may miss the tolerance
+    assert ("CONVERGENCE WAS ACHIEVED" in printed) == ("CONVERGENCE WAS ACHIEVED" in logged)
+    first = lambda text: re.search(r"abs-norm = (\S+)", text)[1]
+    assert first(printed) == first(logged)
+
+
+@needs_kratos
+@pytest.mark.parametrize("names", [("before", "after"), ("contact-before", "contact-after")], ids=str)
+def test_both_assignments_of_the_roles_end_at_the_same_forces(tmp_path, names):
+    forces = []
+    for name in names:
+        (folder := tmp_path / name).mkdir()
+        body = kratos_runs.RUNS[name][1]["neumann_body"]
+        output = {
+            "model_part_name": "Structure.Interface",
+            "output_path": "vectors",
+            "file_format": "ascii",
+            "output_precision": 9,
+            "nodal_solution_step_data_variables": ["POINT_LOAD"],
+        }
+        operation = {
+            "type": "coupling_output",
+            "solver": f"Body{body}",
+            "execution_point": "finalize_coupling_iteration",
+            "output_parameters": output,
+        }
+        printed = kratos_runs.printed(folder, name, coupling_operations={"forces": operation})
+        last = f"Body{body}_Structure.Interface_finalize_coupling_iteration_0_1_{printed.count(ITERATION)}.vtk"
+        found = meshio.read(folder / "vectors" / last)
+        forces.append(found.point_data["POINT_LOAD"][np.argsort(found.points[:, 0]), :2])
+    assert np.linalg.norm(forces[0] + forces[1]) < 1e-5 * np.linalg.norm(forces[0])  # action and reaction
