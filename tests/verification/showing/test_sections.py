@@ -61,8 +61,9 @@ def words(text: str) -> str:
 
 
 def page_words(page: str) -> str:
-    """Those of a page of HTML."""
-    return words(html.unescape(re.sub(r"<[^>]*>", " ", page)))
+    """Those of a page of HTML, its raised powers and the lowered index of Gamma_c as they are typed."""
+    typed = re.sub(r"<sup>(.*?)</sup>", r"^\1", page.replace("Γ<sub>c</sub>", "Gamma_c"))
+    return words(html.unescape(re.sub(r"<[^>]*>", " ", typed)))
 
 
 def tables(result) -> list[Table]:
