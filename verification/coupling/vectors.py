@@ -46,8 +46,9 @@ STEADY, FEWER, LEFT = 0.05, 2, 1
 #: that fell by more than the second share, where no eigenvalue is below 0, is of no symmetric linear map.
 RISING, FALLS = 0.2, 0.02
 
-#: Iterates come back where they differ by no more than this share of a step.
-BACK = 0.03
+#: Iterates come back where they differ by no more than this share of a step, and ever less, down to the second share:
+#: a linear mode with a factor near -1 changes them by as much from period to period.
+BACK, RETURNED = 0.03, 1e-6
 
 #: Two images of one iterate that are further apart, over its residual, leave no eigenvalue.
 LOUD = 0.1
@@ -189,10 +190,8 @@ class Vectors(Evidence, Value):
             share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
             return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
         if self.period:
-            causes = (
-                self.kind.given("contact that opens and closes, ") + "solvers that are not linear, or a limit of theta"
-            )
-            rather = f"{causes}; IQN-ILS, another start or exchanged roles decide more than a smaller theta"
+            causes = self.kind.given("contact that opens and closes, ") + "solvers that are not linear, or theta at its"
+            rather = f"{causes} limit. A smaller theta helps only in the last case; IQN-ILS or another start may in all"
             return f"no progress: the iterates come back after {self.period} steps, which these make: {rather}"
         if self.kind.parallel and (self.noise or 0.0) > 1:
             needed = "needed both fields in a row, their images likewise, and solvers with less noise"
@@ -420,8 +419,9 @@ def _apart(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> float | None:
 def _period(X: Floats) -> int:
     """The least number of steps after which the last iterates come back, over four periods; 0 where they do not."""
     step = float(np.linalg.norm(X[-1] - X[-2]))
-    back = lambda p: step > 0 and bool((np.linalg.norm(X[p:] - X[:-p], axis=1)[-3 * p :] <= BACK * step).all())
-    return next((p for p in range(2, (len(X) - 1) // 4 + 1) if back(p)), 0)
+    apart = lambda p: np.linalg.norm(X[p:] - X[:-p], axis=1)[-3 * p :]
+    back = lambda d: step > 0 and d.max() <= BACK * step and d[-1] <= max(d[0] / 2, RETURNED * step)
+    return next((p for p in range(2, (len(X) - 1) // 4 + 1) if back(apart(p))), 0)
 
 
 def last_piece(TX: Floats) -> int:

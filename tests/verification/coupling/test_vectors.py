@@ -366,8 +366,16 @@ def test_iterates_that_come_back_are_no_progress_and_leave_no_theta():
     found = vf.advise_vectors(X, TX, kind="tied")
     assert (found.vectors.period, found.theta, found.method) == (2, None, None)
     assert "no progress: the iterates come back after 2 steps" in found.why_no_theta
-    assert Linear([0.5, 2.0]).run("constant", 0.5, 12) is not None
     assert vf.advise_vectors(*Linear([0.5, 2.0]).run("constant", 0.5, 12)).vectors.period == 0
+
+
+@pytest.mark.parametrize("factor", [-0.9, -0.975, -0.99, -1.02])
+@pytest.mark.parametrize("steps", [12, 60])
+def test_a_linear_mode_that_alternates_slowly_is_no_cycle_and_leaves_its_theta(factor, steps):
+    """The factor of the stiffest mode is close to -1; a little smaller theta converges."""
+    linear = Linear([0.2, 0.7, 1.5, 3.0])
+    found = vf.advise_vectors(*linear.run("constant", (1 - factor) / 4, steps), kind="tied")
+    assert (found.vectors.period, found.theta) == (0, pytest.approx(0.379, abs=1e-3))
 
 
 def test_where_no_theta_converges_the_method_that_does_is_named():
