@@ -83,8 +83,6 @@ def test_a_surface_by_faces_and_a_set_of_nodes_are_sides(tmp_path, name, halved,
         "*SURFACE, TYPE=NODE, NAME=top\nBlock\n",
         "*SURFACE, NAME=top\nBlock, SPOS\n",  # a face of the plate
         "*SURFACE, NAME=top\n9, S4\n",  # a triangle has three
-        "*SURFACE, NAME=top\nBlok, S3\n",
-        "*SURFACE, NAME=top\n8, S3\n",
         "*NSET, NSET=top\n1\n",
     ],
 )
@@ -95,6 +93,21 @@ def test_what_has_no_edge_is_no_side(tmp_path, words):
     refused(
         tmp_path / "body.inp", "no named lines; give the sides physical names, in Abaqus a \\*SURFACE or an \\*NSET"
     )
+
+
+@pytest.mark.parametrize(
+    ("lists", "why"),
+    [
+        ("Block, S3\nBlok, S3", "surface top lists Blok, which is no element set"),
+        ("-1, S3", "surface top lists -1, which is no element set"),
+        ("1, S3\n8, S3", "surface top lists an element that it does not have"),
+    ],
+)
+def test_a_surface_that_lists_what_the_file_lacks_is_refused_and_loses_no_edge(tmp_path, lists, why):
+    (tmp_path / "body.inp").write_text(
+        NODES.split("12, .5")[0] + LINEAR.format(quad="CPE", triangle="CPE") + SQUARE + f"*SURFACE, NAME=top\n{lists}\n"
+    )
+    refused(tmp_path / "body.inp", why)
 
 
 def test_a_set_with_a_node_inside_is_no_side(tmp_path):
