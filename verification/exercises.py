@@ -7,6 +7,8 @@ import math
 from importlib.resources import files
 from typing import Any
 
+import numpy as np
+
 from ndtheory.number import exact
 from ndtheory.texts import did_you_mean
 
@@ -39,10 +41,11 @@ def check(exercise: str, answer: Any) -> str:
     ('right', 'Not yet. Did you forget a square?')
     """
     known = json.loads((files("verification") / "data" / "exercises.json").read_text("utf-8"))
+    exercise = str(exercise)
     if exercise not in known:
         raise ValueError(f"no exercise {exercise!r}; there are {', '.join(known)}{did_you_mean(exercise, known)}")
     right = known[exercise]["right"]
-    given = [answer] if isinstance(answer, str) or not hasattr(answer, "__len__") else list(answer)
+    given = np.array(answer, dtype=object).ravel()
     if len(given) != len(right):
         raise ValueError(f"{exercise}: needed {known[exercise]['asks']}, {len(right)} in all; received {answer!r}")
     for n, part in enumerate(given):

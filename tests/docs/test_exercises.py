@@ -58,6 +58,7 @@ def test_the_answer_is_right_and_a_usual_mistake_gets_its_hint(name):
 def test_an_answer_may_be_fractions_an_array_or_rounded_to_three_digits():
     assert vf.check("two_bars.2", ("1/3", "3/4", "6/7", "3/2")) == "right"
     assert vf.check("two_bars.2", np.array([0.333, 0.75, 0.857, 1.5])) == "right"
+    assert vf.check("two_bars.3", np.array(KNOWN["two_bars.3"]["right"][0])) == "right"
     assert vf.check("two_bars.2", [0.33, 0.75, 0.857, 1.5]) == "Not yet, number 1."
     assert vf.check("theorem_and_experiment.2", ["violated", "consistent", "INCONCLUSIVE"]) == "right"
 
@@ -77,7 +78,11 @@ def test_the_hints_fit_the_mistakes_that_they_are_for():
     [
         ("two_bars.4", 1, r"no exercise 'two_bars\.4'; there are two_bars\.1, .*other_code\.1; did you mean"),
         ("two_bars.2", 1, r"two_bars\.2: needed rho, .*, 4 in all; received 1"),
+        (3, 1, r"no exercise '3'; there are two_bars\.1"),
         ("two_bars.3", "a third", "'a third' is not a number"),
+        ("two_bars.3", b"1", "is not a number"),
+        ("two_bars.3", {1: 2}, "is not a number"),
+        ("two_bars.3", None, "'None' is not a number"),
         ("two_bars.3", float("nan"), "'nan' is not a finite number"),
     ],
 )
