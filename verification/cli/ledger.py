@@ -134,12 +134,12 @@ def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | 
 
     write = writer(folder, "reproduce")
     names = FIGURES if figure == "all" else (figure,)
-    kept = store if store is not None or folder is None else folder / "rows.sqlite"
+    kept = None if figure == "fig5" else store or (folder and folder / "rows.sqlite")  # figure 5 is solved anew
     complain(f"{len(READINGS) * sum(map(size_of, names))} rows; all figures take about 90 s of one processor")
     try:
         with long_stages() as tell, term_interrupts():
             found = run_again(names, jobs=jobs or -1, store=kept, progress=tell)
     except KeyboardInterrupt:
-        where = "-o keeps rows" if kept is None else f"its rows are in {kept}, and the same command goes on from there"
-        raise KeyboardInterrupt(f"interrupted: {where}") from None
+        there = kept and f"its rows are in {kept}, and the same command goes on from there"
+        raise KeyboardInterrupt(f"interrupted: {there or '-o keeps rows of figures 10 to 12'}") from None
     deliver(found, sections, as_json, write, folder)

@@ -3,6 +3,7 @@
 import re
 import shlex
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from ledger_calls import EXACT, RAW, STATEMENTS, TEXTS, VERDICTS, one_line, wide
@@ -133,3 +134,22 @@ def test_two_formulas_that_differ_are_not_shown_alike(one, other):
 )
 def test_a_formula_keeps_its_meaning_on_a_terminal(tex, shown):
     assert plain(tex) == shown
+
+
+@pytest.mark.parametrize(
+    ("figure", "options", "kept"),
+    [("fig10", ["-o", "out"], "out/rows.sqlite"), ("fig10", [], None), ("fig5", ["-o", "out"], None)],
+)
+def test_an_interrupted_reproduction_says_where_its_rows_are(call, monkeypatch, tmp_path, figure, options, kept):
+    """Figure 5 has no runs whose rows could be kept."""
+
+    def interrupted(*names, store, **more):
+        assert store == (None if kept is None else Path(kept))
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("verification.reproduce.reproduce", interrupted)
+    answer = call("reproduce", figure, *options)
+    there = f"its rows are in {kept}, and the same command goes on from there"
+    ended = f"interrupted: {there if kept else '-o keeps rows of figures 10 to 12'}"
+    assert (answer.status, answer.err.splitlines()[-1]) == (130, ended)
