@@ -211,14 +211,15 @@ def largest_step_ratio(
 
 
 def steps(rate: float, tolerance: float = 1e-9, rest: float | None = None) -> int | None:
-    """Number of steps of a rate to a tolerance; None where no number is enough.
+    """Number of steps of a rate to a tolerance; None where no number is enough, or no double is so large.
 
     ``rest`` is 1 - rate, where it is known without cancellation.
 
     >>> steps(0.1, 1e-3), steps(1.0, rest=1e-20) > 2e21, steps(1.0)
     (3, True, None)
     """
-    rest = 1 - rate if rest is None else rest
+    rest = float(1 - rate if rest is None else rest)
     if not 0 < rest < 1:
         return 1 if rest == 1 else None
-    return math.ceil(math.log(tolerance) / math.log1p(-rest) * (1 - 1e-12))
+    count = math.log(tolerance) / math.log1p(-rest) * (1 - 1e-12)
+    return math.ceil(count) if count < math.inf else None

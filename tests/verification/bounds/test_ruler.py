@@ -29,6 +29,8 @@ def test_a_factor_that_rounds_to_1_promises_by_its_distance_from_1():
     near = result(Number.of_float(1.0), Number.of_float(1e-20))
     assert promised(near, 1e-9) == pytest.approx(20.72326583694641e20, rel=1e-12)
     assert steps(1.0, 1e-9) is None
+    assert steps(1.0, 1e-9, 1e-320) is None  # more than any double
+    assert steps(0.0, 1e-9, 1 - Fraction(1, 10**30)) == 1
     proved = Number(value=0.5, lo=0.4, hi=0.6, level="verified")
     assert promised(result(proved, Number(value=0.5, lo=0.4, hi=0.6, level="verified")), 1e-9) == steps(0.6)
 
