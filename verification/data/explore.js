@@ -216,15 +216,15 @@ nd.onPage("explore", (figure) => {
       const k = friction.value, last = run.shown.length - 1;
       const best = data.bounds.map(({ name }, b) => [name, run.factors[b]]).filter(([, factor]) => factor !== null).sort((a, b) => a[1] - b[1])[0];
       const rate = run.rate === null || run.outcome !== "converged" ? "" : `, each leaving ${number(run.rate)} of the error`;
+      const most = drawRuler(role, run, best);
       says.textContent = `theta = ${number(data.theta[theta.value])}, k = ${number(data.friction[k])}, Neumann body ${role.neumann} (${role.name}): ${ended(run)}${rate}. `
-        + (best ? `For any loads a step leaves at most ${number(best[1])} of the error, so that at most ${drawRuler(role, run, best)} steps are needed.` : "No bound says that a step contracts here.")
+        + (best ? `For any loads a step leaves at most ${number(best[1])} of the error${most === null ? "" : `, so that at most ${most} steps are needed`}.` : "No bound says that a step contracts here.")
         + (run.leftOut ? ` The bodies leave the picture: ${run.leftOut} of ${run.leftOut + run.shown.length} drawings of this run are left out.` : "");
       stageTitle.textContent = last < 0 ? "The bodies" : `The bodies at step ${run.shown[i]}`;
       stepText.textContent = last < 0 ? "none" : `${run.shown[i]} of ${run.steps}`;
       drawResiduals(run, i);
       drawMap(role);
       drawFactors(role, k);
-      if (!best) drawRuler(role, run, best);
       nd.fill(table, ["step", "relative residual"], run.residuals.map((r, s) => [s, r === null ? "too large for a number" : nd.digits(r)]));
     };
   }

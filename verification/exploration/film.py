@@ -130,8 +130,8 @@ def film(
 
 
 def _factor(bound: Bound, subject: Subject, theta: Fraction) -> float | None:
-    factor = bound.evaluate(subject, theta).factor
-    return None if factor is None else factor.value
+    found = bound.evaluate(subject, theta)
+    return found.factor.value if found.proved and found.factor is not None else None
 
 
 def _shown(pair: ContactPair, theta: Fraction, farthest: float, factors: dict[str, float | None]) -> FilmedRun:
