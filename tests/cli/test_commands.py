@@ -132,6 +132,10 @@ def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monke
         assert judged
         for bound in result.bounds:
             assert [line for line in short if re.search(rf"\b{bound}\b", line)]
+        words = " ".join(" ".join(short).split())
+        for bound, judged in result.verdicts.items():  # a reason belongs to the bound before it
+            assert f", {bound}: " not in words
+            assert f" {bound}: " not in words or f" {bound}: {judged.reason}" in words
 
 
 @pytest.mark.parametrize("name", ["section6-190", "signorini", "two-bars"])

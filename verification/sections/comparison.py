@@ -135,8 +135,8 @@ class Parts(Listener):
             total = sum(loss.decades for loss in estimates)
             unit = sum(loss.decades for loss in friction) - total
             links = ", ".join(f"10^{loss.decades:.1f} by {loss.label}" for loss in estimates)
-            sizes = f"10^{total:.1f} (printed: by 10^{total + unit:.1f})"
-            parts.append(f"The friction bound (5.30) exceeds the largest friction term found by {sizes}: {links}.")
+            sizes = f"10^{total:.1f} (printed 10^{total + unit:.1f})"
+            parts.append(f"The friction bound (5.30) exceeds what was found by {sizes}: {links}.")
         if parts:
             self.show((section("losses", "HOW MUCH DOES EACH ESTIMATE LOSE?", *parts, pictures=WATERFALL),))
 
@@ -171,7 +171,7 @@ class FirstParts(Parts):
 
 @registry.screen.register
 def first(result: Comparison) -> Sections:
-    """The first screen, of at most 15 lines: does it converge, how fast, proved by what, which theta, what next?"""
+    """The first screen, of about 15 lines: does it converge, how fast, proved by what, which theta, what next?"""
     if result.problem is None:
         return ()
     found: list[Section] = []
@@ -189,12 +189,13 @@ def proofs(result: Comparison) -> Sections:
             if bound.asked:
                 without.setdefault(WORDS[verdict.verdict], []).append(name)
             continue
-        says = marked("contracts", bound.level) if bound.proved else "is claimed to contract"
+        says = marked("contracts", bound.level) if bound.proved else "claims contraction"
         rows.append((name, says, factor(bound.factor, bound.one_minus_factor), _most(steps), WORDS[verdict.verdict]))
     parts: list[Shown] = []
     for words, names in without.items():
-        why = "" if result.run.outside else f": {result.verdicts[names[-1]].reason}"
-        parts.append(Labelled(words, f"{', '.join(names)}{why}"))
+        too = "".join(f"; {', '.join(names[:-1])} too" for _ in names[1:2])
+        why = f"{names[-1]}: {result.verdicts[names[-1]].reason}{too}"  # each has another reason
+        parts.append(Labelled(words, ", ".join(names) if result.run.outside else why))
     if rows:
         known = "v: verified" if any(bound.marked for bound in result.bounds.values()) else "in doubles"
         to = f"steps to {tolerance:.0e}".replace("e-0", "e-")
