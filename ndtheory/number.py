@@ -38,7 +38,10 @@ OF_SIZE = f"of a size between 1e-{LARGEST_EXPONENT} and 1e{LARGEST_EXPONENT}"
 
 
 def typed(value: object) -> str:
-    """A value as a user would type it: numbers in 12 digits, fractions that are no decimals as such."""
+    """A value as a user would type it: numbers in 12 digits, fractions that are no decimals as such.
+
+    A double next to a whole number keeps all its digits, which say on which side it is.
+    """
     if isinstance(value, int) and value.bit_length() > 1000:
         return f"an integer of {value.bit_length()} bits"
     if isinstance(value, Fraction):
@@ -46,8 +49,8 @@ def typed(value: object) -> str:
         if max(abs(n), d) < 10**15 and (d == 1 or 10 ** d.bit_length() % d):  # or no decimal
             return str(value)
         return str(Context(prec=12).create_decimal(decimal(value)).normalize()).lower()
-    text = str(value)
-    return f"{value:.12g}" if isinstance(value, float) and len(text) > 14 else text
+    text, short = str(value), f"{value:.12g}" if isinstance(value, float) else ""
+    return short if "." in short and len(text) > 14 else text
 
 
 class UnusualSize(ValueError):

@@ -253,7 +253,7 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
         if all(column.residual in RELATIVE for column in columns if column.count("level")):
             readings = (level(theta),)  # of a relative residual also a run that grows
     elif ratio is not None:
-        readings, following, rho = read_observed(theta, ratio, kind)
+        readings, following, rho = read_observed(theta, ratio, kind, measured=bare.converges)
         if not bare.converges and all(reading.kind != "level" for reading in readings):
             readings, rho = (*readings, level(theta, bounds=False)), None
     else:

@@ -202,7 +202,7 @@ def spread(theta: Fraction) -> Fraction:
 
 
 def read_observed(
-    theta: Fraction, ratio: Observed, kind: Kind = CONTACT, *, converges: bool = True
+    theta: Fraction, ratio: Observed, kind: Kind = CONTACT, *, converges: bool = True, measured: bool = False
 ) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """Every reading of a ratio of residuals at theta, the run to make next, and rho of the only reading.
 
@@ -212,7 +212,8 @@ def read_observed(
     """
     r = ratio.value
     high = (1 + r) / theta - 1
-    readings = _readings(theta, ratio, high, kind)
+    falls = measured and 1 - ratio.most > 2 * (ratio.most - ratio.least)
+    readings = _readings(theta, ratio, high, kind, falls=falls)
     kinds = [reading.kind for reading in readings]
     best = predicted_theta(high)
     between = 2 / (high + Fraction(7, 4))  # above the best theta of mode-high, below the one at which it diverges
@@ -236,8 +237,11 @@ def read_observed(
     return readings, NextRun(theta=rounded_down(following), why=why), rho
 
 
-def _readings(theta: Fraction, ratio: Observed, value: Fraction, kind: Kind) -> tuple[RunReading, ...]:
-    """The readings of a ratio; ``value`` is the lambda of a mode that changes its sign."""
+def _readings(theta: Fraction, ratio: Observed, value: Fraction, kind: Kind, *, falls: bool) -> tuple[RunReading, ...]:
+    """The readings of a ratio; ``value`` is the lambda of a mode that changes its sign.
+
+    What ``falls`` steadily is at no level, however slowly it falls.
+    """
     r, high, low = ratio.value, (1 + ratio.least) / theta - 1, (1 - ratio.most) / theta - 1
     fastest = f"the stiffest mode in this run has lambda = {few((1 + ratio.most) / theta - 1)} at most"
     given = kind.given("without friction, or tied, ")
@@ -260,7 +264,7 @@ def _readings(theta: Fraction, ratio: Observed, value: Fraction, kind: Kind) -> 
     if open_too:
         says = f"nodes that are open set the pace, 1 - theta a step, whatever rho is; {fastest}"
         found.append(RunReading(kind="open", says=says))
-    if ratio.most >= 1 - spread(theta) and ratio.most > 1 - theta and not open_too:
+    if ratio.most >= 1 - spread(theta) and ratio.most > 1 - theta and not (open_too or falls):
         found.append(level(theta))
     return tuple(found)
 

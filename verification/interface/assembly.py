@@ -398,9 +398,7 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         known.append(None if mesh is None else _supports(problem, name, mesh))
     nodes, interface = (join_lines if problem.several else join)(problem, meshes, known, law)
     if dense and interface.contact.n > MOST_CONTACT_NODES:
-        needed = (
-            f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}; `solve` takes more"
-        )
+        needed = f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}"
         raise TooManyContactNodes(problem.source, "contact", None, needed)
     body1, body2 = (
         None if mesh is None or held is None else _body(problem, name, mesh, held, own, interface)
