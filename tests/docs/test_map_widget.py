@@ -2,6 +2,7 @@
 
 import random
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from browser import needs_browser
@@ -57,7 +58,10 @@ def test_a_broken_proof_has_the_thresholds_of_both_editions_and_a_friction_term_
     assert len(found) == 2 ** len(losses.friction)
     assert min(found, key=found.get) == ""
     assert max(found, key=found.get) == " ".join([*links, unit])
-    assert found[" ".join([*links, unit])] < measured.friction_threshold.value
+    most, energy = found[" ".join([*links, unit])], measured.friction_threshold.value
+    assert most < energy
+    page = (Path(__file__).parents[2] / "docs" / "theory.md").read_text("utf-8")
+    assert f"it is {most:.3f}, somewhat less than the {energy:.3f} that" in page
 
 
 @needs_browser
