@@ -196,6 +196,8 @@ def proofs(result: Comparison) -> Sections:
         too = "".join(f"; {', '.join(names[:-1])} too" for _ in names[1:2])
         why = f"{names[-1]}: {result.verdicts[names[-1]].reason}{too}"  # each has another reason
         parts.append(Labelled(words, ", ".join(names) if result.run.outside else why))
+    others = ((NAMES[name], judged) for name, judged in result.verdicts.items() if name in NAMES)
+    parts += [Labelled(name, f"violated: {each.reason}") for name, each in others if each.verdict == "VIOLATED"]
     if rows:
         known = "v: verified" if any(bound.marked for bound in result.bounds.values()) else "in doubles"
         to = f"steps to {tolerance:.0e}".replace("e-0", "e-")

@@ -1,5 +1,6 @@
 """Steps that bounds promise: never fewer than the run needs, and as many as exact powers of the factor."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -9,6 +10,7 @@ from ndtheory import Number
 from verification.algorithm.rates import steps
 from verification.bounds.bound import BoundResult
 from verification.bounds.ruler import OBSERVED, PREDICTED, promised, ruler
+from verification.bounds.verdicts import Judgement
 from verification.figures import draw_ruler
 
 
@@ -45,6 +47,15 @@ def test_the_marks_of_a_run_are_in_order_and_what_is_promised_covers_what_is_see
     axes = draw_ruler(found).axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == list(marks)
     assert axes.get_xlabel() == "steps to 1e-09 of the first error; no promise by printed, repaired"
+
+
+def test_the_first_screen_shows_each_violation():
+    found = vf.compare(vf.example("two-bars"), bounds=["energy"])
+    broken = Judgement(verdict="VIOLATED", reason="seen otherwise")
+    assert "violated" not in (screen := found._repr_html_())
+    assert "forecast" not in screen
+    for name, words in (("energy", "violated"), ("linearised", "violated: seen otherwise")):
+        assert words in replace(found, verdicts={**found.verdicts, name: broken})._repr_html_()
 
 
 def test_bounds_promise_nothing_of_a_run_outside_the_theorem():
