@@ -59,7 +59,7 @@ class Listener:
 
 
 def _beside_each_other(bounds: Mapping[str, BoundResult]) -> dict[str, BoundResult]:
-    """The bounds without a key of their own."""
+    """The bounds that share one key of the document."""
     return {name: bound for name, bound in bounds.items() if not BOUNDS[name].apart}
 
 
@@ -72,7 +72,7 @@ class Comparison(Document):
     bounds : mapping from name to BoundResult
         From the weakest to the strongest.
     verdicts : mapping from the name of a bound to Judgement
-        And of ``linearised``, the forecast made half way.
+        Also of ``linearised``, the forecast made half way.
     reason : mapping
         Why a bound, losses, step_ratio or cvxpy is missing; losses and cvxpy come with bounds that need the matrices.
     """

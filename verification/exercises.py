@@ -33,7 +33,7 @@ def check(exercise: str, answer: Any) -> str:
     Raises
     ------
     ValueError
-        An unknown exercise; the message lists all. An answer with another number of parts.
+        The exercise is unknown (the message lists all), or the answer has another number of parts.
 
     Examples
     --------

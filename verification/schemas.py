@@ -105,7 +105,7 @@ def schema(name: str) -> JsonSchema:
     Raises
     ------
     ValueError
-        An unknown name; the message lists the known ones.
+        The name is unknown; the message lists the known ones.
 
     Examples
     --------

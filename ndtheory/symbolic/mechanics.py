@@ -204,8 +204,8 @@ check(
 check(
     id="4.7",
     text="Two bars, |phi|^2 = coth(L_2) >= 1/L_2 in the norm of the one, |R phi|^2 = L_1/3 + 1/L_1 in the other:"
-    " measured in another body the norm of a trace exceeds that of its lift.  In the same body the infimum is at most"
-    " one of its values.",
+    " measured in another body the norm of a trace exceeds the norm of its lift.  In the same body the infimum is at"
+    " most one of its values.",
     goals=lambda form: form(y),
     forms={
         "printed": lambda lifted: at_most(lifted / 3 + 1 / lifted, 1 / t),

@@ -83,9 +83,9 @@ class Rule(ABC):
     words : str
         Its name in a sentence.
     needs_rho : bool
-        Whether :meth:`begin` needs rho; it is measured then.
+        True if :meth:`begin` needs rho, which is measured then.
     takes_theta : bool
-        Whether a given theta is used.  A rule without it needs rho, and :meth:`own_step` takes the place of theta.
+        True if a given theta is used.  A rule without it needs rho, and :meth:`own_step` takes the place of theta.
     """
 
     name: ClassVar[str]

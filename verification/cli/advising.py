@@ -107,7 +107,7 @@ def of_kind(command: Callable[..., None]) -> Callable[..., None]:
 SNIPPETS_OF = click.option(
     "--snippets",
     type=OneOf([*SNIPPETS, "all"], case_sensitive=False),
-    help="Print whole blocks for the configuration of a coupling library instead, serial coupling.",
+    help="Print whole blocks for the configuration of a coupling library instead; only for serial coupling.",
 )
 
 
@@ -123,13 +123,13 @@ def _words(context: click.Context, parameter: click.Parameter, begun: str) -> li
 @SNIPPETS_OF
 @JSON
 def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: str | None, as_json: bool) -> None:
-    """Which body gets the Neumann problem, and which theta?
+    """Choose the body that gets the Neumann problem, and theta.
 
-    For two solvers coupled along an interface: elastic contact, tied bodies, heat (temperature and flux), and a fluid
-    with a structure (FSI, added mass).
+    The advice is for two solvers coupled along an interface: elastic contact, tied bodies, heat (temperature and flux),
+    and a fluid with a structure (FSI, added mass).
 
-    FILE is a problem file, or the interface.npz that a run has written.  Both assignments of the roles are compared:
-    theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
+    FILE is a problem file, or the interface.npz that a run has written.  The answer compares both assignments of the
+    roles by theta (no unit) and the factor of a step, predicted and proved.  It has lines to paste for your library.
 
     The commands below need no problem file; two solvers that are Python functions are coupled by verification.couple.
     Write ./run for a file that has the name of a command.
@@ -183,9 +183,9 @@ def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callabl
 @click.command(cls=AdviseCommand)
 @_matrix("--S1", "S1", "Interface stiffness of body 1, or one file with S1 and S2.", required=True)
 @_matrix("--S2", "S2", "Interface stiffness of body 2.")
-@_matrix("--map", "transfer", "Transfer P from the unknowns or nodes of the Neumann body to those of the contact body.")
+@_matrix("--map", "transfer", "Transfer P, from the Neumann body's unknowns or nodes to the contact body's.")
 @click.option(
-    "--neumann-body", type=OneOf(["1", "2"]), help="From whose unknowns --map leads, where its shape fits both ways."
+    "--neumann-body", type=OneOf(["1", "2"]), help="Body from whose unknowns --map leads, if its shape fits both ways."
 )
 @of_kind
 @click.option(
@@ -202,16 +202,16 @@ def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callabl
     help="Radius of the hat kernel, in the unit of --x.",
 )
 @_matrix("--kernel", "kernel", "Operator S of the law of friction: normal nodal forces to stress at these nodes.")
-@_matrix("--weights", "weights", "Weights of the quadrature on these nodes; by default those of the trapezoid rule.")
+@_matrix("--weights", "weights", "Weights of the quadrature on these nodes; by default the trapezoid rule.")
 @SNIPPETS_OF
 @JSON
 def matrices(kind: Kind, snippets: str | None, as_json: bool, **given: Any) -> None:
     """Advice from the interface stiffnesses of any code.
 
     S1 and S2 are the Schur complements of both bodies on the same interface unknowns, or on two grids with a --map.
-    Force per displacement, in any one unit; MATRIX is a file .npy, .npz, .mtx, .mat, .csv or .txt;
-    P.npz of a run is a --map, with the positions and weights of both grids.  With friction or a map vectors list all
-    tangential components from left to right, then all normal ones.
+    They are forces per displacement, in any one unit.  MATRIX is a file .npy, .npz, .mtx, .mat, .csv or .txt.  P.npz of
+    a run is a --map, with the positions and weights of both grids.  With friction or a map, vectors list all tangential
+    components from left to right, then all normal ones.
 
     In a transient the matrices are those of K + c M/dt^2 (c = 1/beta of Newmark's method): the better role may change
     with dt.
@@ -244,26 +244,26 @@ def matrices(kind: Kind, snippets: str | None, as_json: bool, **given: Any) -> N
     "thetas",
     metavar="NUMBER",
     multiple=True,
-    help="Relaxation factor of the run, 0 < theta <= 1; of several logs one each, in their order; none where every log "
-    "names its factor, or is of Aitken or quasi-Newton.",
+    help="Relaxation factor of the run, 0 < theta <= 1.  Give one for each log, in their order, or none if every log "
+    "names its factor or is of Aitken or quasi-Newton.",
 )
 @click.option(
     "--ratio",
     "ratios",
     metavar="NUMBER",
     multiple=True,
-    help="Ratio of its residual |Tg - g|, absolute and unrelaxed, from one step to the next, steady over 10 or more; "
-    "1 where it rises and falls.  Of several runs, of kind general, one each with its --theta.",
+    help="Ratio of the absolute, unrelaxed residuals |Tg - g| of successive steps, steady over 10 or more; 1 if they "
+    "rise and fall.  Of kind general give one for each run, with its --theta.",
 )
 @click.option(
     "--pattern",
     metavar="REGEX",
-    help="Lines of another log: one group, the residual, or groups named residual, iteration, theta, and omega of "
-    "Aitken.",
+    help="Regular expression for the lines of another log: its one group is the residual, or its groups are named "
+    "residual, iteration, theta and omega (of Aitken).",
 )
-@click.option("--format", "name", metavar="NAME", help="Format of the logs, where one is not recognised by itself.")
+@click.option("--format", "name", metavar="NAME", help="Format of the logs if it is not recognised, as SU2.")
 @click.option("--log10", is_flag=True, help="The residuals are decimal logarithms, as of SU2.")
-@click.option("--friction", is_flag=True, help="There is friction: bounds, and the run to make next.")
+@click.option("--friction", is_flag=True, help="There is friction; the answer has bounds and the next run.")
 @of_kind
 @SNIPPETS_OF
 @JSON
@@ -459,7 +459,7 @@ def vectors(iterates: Path, images: Path | None, kind: Kind, snippets: str | Non
     X has a row for each iterate of a run, TX the row that T made of it before relaxation, in any one unit; three to ten
     iterates of a run by any method are enough, all of one step in time.  Files are .npy, .npz (one file with X and TX
     too), .mtx, .mat, .csv or .txt.  The answer has the ends of the spectrum (no unit), theta, and the steps of a
-    constant theta, Aitken and IQN-ILS.  With --parallel a row has both fields, one behind the other.
+    constant theta, Aitken and IQN-ILS.  With --parallel a row has both fields, one after the other.
 
     \b
     Examples:

@@ -39,7 +39,7 @@ _number = partial(click.option, metavar="NUMBER")
     type=OneOf([*(edition.name for edition in EDITIONS), "both"]),
     default="both",
     show_default=True,
-    help="Editions of Section 5.",
+    help="Edition of the theorem of Section 5.",
 )
 @_number("--rho", help="Bound in energy norms: stiffness ratio of the bodies on Gamma_c.")
 @_number("--kappa1", "kappa_1", help="Bound in energy norms: k C_s_energy C_t1, see `constants`; 0 without friction.")
@@ -50,11 +50,11 @@ _number = partial(click.option, metavar="NUMBER")
 def bounds(
     edition: str, theta: str | None, target: Path | None, check: bool, as_json: bool, **given: str | None
 ) -> int:
-    """For which theta and friction does one step contract?
+    """Calculate for which theta and friction one step contracts.
 
-    Numbers may be rationals (1/3).  m, M, Cs and CK are in any one unit of stress; the printed theorem depends on
-    which, the repaired one does not.  --rho, --kappa1 and --kappa2, dimensionless, give the theorem in energy norms
-    (`ndtheory constants` measures all of them), beside the others or alone.
+    Numbers may be rationals (1/3).  m, M, Cs and CK are in any one unit of stress.  The printed theorem depends on
+    this unit, the repaired one does not.  --rho, --kappa1 and --kappa2 have no unit and give the theorem in energy
+    norms, with the other constants or without.  `ndtheory constants` measures all of them.
 
     \b
     Examples, m and M in MPa:

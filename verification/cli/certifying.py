@@ -36,7 +36,7 @@ def _editions() -> Sequence[str]:
     "--norm",
     type=click.Choice(["energy", "lyapunov"]),
     default="energy",
-    help="The norm of the claim: energy is (5.21), lyapunov one that the proof chooses.",
+    help="Norm of the claim: energy is the norm (5.21), lyapunov is one that the proof chooses.",
 )
 @click.option(
     "--exact",
@@ -44,7 +44,7 @@ def _editions() -> Sequence[str]:
     help="Treat contact states case by case, until some loads nearly attain the factor; slower.",
 )
 @click.option(
-    "--continuum", is_flag=True, help="Prove it without a mesh, for two rectangles, each held at its outer side."
+    "--continuum", is_flag=True, help="Prove contraction without a mesh, for two rectangles held at their outer sides."
 )
 @one_file(".json", words="File of the certificate")
 @click.option(
@@ -52,7 +52,7 @@ def _editions() -> Sequence[str]:
     "given",
     type=PATH,
     metavar="FILE.json",
-    help="Check this one again; with FILE also whether it is about the bodies of FILE.",
+    help="Check this certificate again; with FILE, also check that it is about the bodies of FILE.",
 )
 @JSON
 def certify(
@@ -70,7 +70,7 @@ def certify(
 ) -> int:
     """Prove in exact numbers that one step contracts for FILE.
 
-    It is proved on the meshes of FILE, or with --continuum without a mesh.
+    The proof is for the meshes of FILE, or with --continuum for the bodies without a mesh.
 
     The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Anyone
     can check it with a script of under 400 lines, verification/certificate/check.py, which imports nothing of this

@@ -18,7 +18,7 @@ from verification.cli.options import JSON, PATH
 def draft(mesh: Path, mesh2: Path | None, as_json: bool) -> None:
     """Write a problem file for one mesh file with all bodies, or for two.
 
-    The bodies of one file are its pieces, by their physical surfaces (element sets); of two files each is a body.
+    The bodies of one file are its pieces, by their physical surfaces (element sets).  Of two files each is a body.
     Named lines are sides, and those that face each other nearby may touch.  Comments name what is left to choose;
     most files need two edits: the supports of both bodies.
 

@@ -150,14 +150,14 @@ def _first_word(command: click.Command, args: Sequence[str]) -> int | None:
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80})
 @click.version_option(ndtheory.__version__, prog_name="ndtheory", message="%(prog)s %(version)s")
 def cli() -> None:
-    """The convergence theorem of Bayada, Sabil and Sassi for Neumann-Dirichlet contact iterations.
+    """Put the convergence theorem for Neumann-Dirichlet contact iterations to work.
 
-    Bounds, measured constants, the iteration itself, and one verdict for each bound.
+    Measure its constants, evaluate its bounds, run the iteration, judge each bound, and advise which theta to take.
 
     \b
     ndtheory demo                     the Section 6 model, end to end
     ndtheory example section6 > my.toml
-    ndtheory compare my.toml          the same for a problem of your own
+    ndtheory compare my.toml          constants, bounds and a run of your problem
     ndtheory advise my.toml           which body first, which theta
     ndtheory verify                   every statement of the paper, checked
     """

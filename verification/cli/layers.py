@@ -23,9 +23,9 @@ from verification.output.files import writing
 @click.option("--radius", required=True, metavar="R", help="Radius of the hat kernel, in the unit of --depth.")
 @click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1; without it the best one.")
 @click.option(
-    "--verified", is_flag=True, help="Prove the numbers in intervals, for every wave number: ten seconds, or minutes."
+    "--verified", is_flag=True, help="Prove the numbers in intervals, for every wave number; takes up to minutes."
 )
-@one_file(".svg", ".png", words="Figure to draw: the plane of theta and k, by factor")
+@one_file(".svg", ".png", words="Figure to draw, the factor over theta and k")
 @JSON
 def layers(
     young: str,
@@ -41,8 +41,8 @@ def layers(
     """Bound the factor of one step between two layers, without a mesh.
 
     Two layers, each clamped at its far side, touch along any part of a line.  The proof
-    chooses a norm for the factor; beside it is the one in the norm (5.21) of the paper.  Both roles are shown.  For
-    bodies with ends it is a prediction.
+    chooses a norm for the factor; the factor in the norm (5.21) of the paper is shown, too, and both roles.  For
+    bodies with ends the numbers are predictions.
 
     \b
     Example, in MPa and mm, the layers of Section 6:

@@ -21,7 +21,7 @@ from verification.machine.interrupts import term_interrupts
 @click.option(
     "--level",
     type=OneOf(["quick", "full"]),
-    help="How many problems the discrete evidence takes: within a minute, or within twenty.  [default: quick]",
+    help="Number of problems for the discrete evidence: quick takes a minute, full twenty.  [default: quick]",
 )
 @one_file(".svg", words="Draw the map of the proof into this file", names=("--map",))
 @FOLDER
@@ -34,9 +34,9 @@ def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path |
     Exit status 1 if a verdict differs from the recorded one.  -o writes the ledger as JSON and Markdown and, if all
     statements are checked, the errata sheet.
 
-    --map draws each ID, or all statements, below what its proof leans on.  An edge is as wide as the powers of ten that
-    its step loses for the built-in problem section6.  With nothing but IDs beside it no statement is checked, and the
-    map has the recorded verdicts.  With --level, -o or --json the statements are checked, and it has what is found.
+    --map draws each ID, or all statements, below the statements that its proof uses.  An edge is as wide as the powers
+    of ten that its step loses for the built-in problem section6.  With only IDs beside it, --map checks no statement
+    and shows the recorded verdicts.  With --level, -o or --json it checks the statements and shows their verdicts.
 
     \b
     Examples:
@@ -113,13 +113,13 @@ NAMES = ("fig5", "fig10", "fig11", "fig12", "all")
 def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | None, as_json: bool) -> None:
     """Run the experiment behind a figure of Section 6 again.
 
-    It is compared with the paper.  The text leaves open where the upper body sits (2 x 0.3 mm and 1.2 x 0.3 mm, E in
-    MPa), whether its top may slide, and names the roles of the bodies in two ways.  Choices that depart from the text,
-    as half models and exchanged moduli, are tried too.  Every combination gets its verdict, and the one that comes
-    nearest is named.  All figures take about 90 seconds of one processor.
+    The result is compared with the paper.  The text leaves open where the upper body sits (2 x 0.3 mm and 1.2 x 0.3 mm,
+    E in MPa) and whether its top may slide, and it names the roles of the bodies in two ways.  Choices that depart from
+    the text, such as half models and exchanged moduli, are tried too.  Every combination gets a verdict; the nearest
+    one is named.  All figures take about 90 seconds of one processor.
 
-    -o writes the rows behind each figure as CSV, and the figures, and keeps each row as soon as it is made, in
-    rows.sqlite or in the file of --store: the same command goes on where an interrupted one has ended.
+    -o writes the figures, and the rows behind each as CSV.  Each row is kept as soon as it is made, in rows.sqlite or
+    in the file of --store.  After an interruption the same command continues from there.
 
     \b
     Examples:

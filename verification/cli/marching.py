@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     type=OneOf(["iteration", "monolithic"]),
     default="iteration",
     show_default=True,
-    help="The iteration, or the global method: the same history by another path.",
+    help="Compute by the iteration, or as a check by the global method.",
 )
 @FOLDER
 @JSON

@@ -94,8 +94,8 @@ BOUNDS = click.option(
     "--bounds",
     callback=_bounds,
     metavar="NAMES",
-    help="Only these bounds, of printed,repaired,energy,lmi,lyapunov and registered ones; all but lyapunov by default, "
-    "and without lmi it is fast.",
+    help="Only these bounds, of printed,repaired,energy,lmi,lyapunov and registered ones; by default all but lyapunov. "
+    "Without lmi the command is fast.",
 )
 
 FULL = click.option("--full", is_flag=True, help="Show all numbers; the first screen has about 15 lines.")

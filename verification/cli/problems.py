@@ -128,7 +128,7 @@ def load(typed: Typed) -> Problem:
 
 @cli.command()
 @of_a_file(SWAP)
-@click.option("--refine", type=click.IntRange(0, 8), default=0, metavar="N", help="Also on meshes halved 1 to N times.")
+@click.option("--refine", type=click.IntRange(0, 8), default=0, metavar="N", help="Halve the mesh up to N times, too.")
 @click.option("--verified", is_flag=True, help="Prove bounds of each constant, for the exact data of FILE on its mesh.")
 @JSON
 def constants(typed: Typed, refine: int, verified: bool, as_json: bool) -> None:
@@ -200,9 +200,8 @@ def run(typed: Typed, solver: Any, start: Path | None, folder: Path | None, as_j
 def solve(typed: Typed, folder: Path | None, as_json: bool) -> int:
     """Solve both bodies of FILE at once, without decomposition.
 
-    The global method: it shares nothing with the iteration but the matrices.  One body may be rigid (shape = "rigid"),
-    and contact may be all that holds a body in one direction.  Exit 1 where no solution was found that passes the
-    checks.
+    This global method shares only the matrices with the iteration.  One body may be rigid (shape = "rigid"), and
+    contact may be all that holds a body in one direction.  Exit 1 where no solution was found that passes the checks.
 
     \b
     Example:
@@ -280,9 +279,9 @@ def compare(
 @FULL
 @JSON
 def demo(folder: Path, full: bool, as_json: bool) -> int:
-    """Compare on the built-in model of Section 6, into a folder.
+    """Compare bounds with a run, for the built-in model of Section 6.
 
-    The folder gets the problem file, the report, the figures and the JSON document.
+    A folder gets the problem file, the report, the figures and the JSON document.
 
     \b
     Example:

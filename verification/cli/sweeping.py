@@ -41,11 +41,11 @@ def _axes(context: click.Context, parameter: click.Parameter, given: tuple[str, 
 @cli.command()
 @FILE
 @JOBS
-@click.option("--dask", metavar="ADDRESS", help="A dask scheduler whose workers run, as tcp://host:8786.")
+@click.option("--dask", metavar="ADDRESS", help="Run on the workers of this dask scheduler, as tcp://host:8786.")
 @STORE
 @click.option("--fresh", is_flag=True, help="Make all rows again, those in the store too.")
 @click.option("--retry", is_flag=True, help="Make those rows of the store again that ended in an error.")
-@click.option("--dry-run", is_flag=True, help="Say how many runs there are and how many the store has; run nothing.")
+@click.option("--dry-run", is_flag=True, help="Print the number of runs, and how many the store has; run nothing.")
 @click.option("--export", type=PATH, metavar="DIR", help="Write NAME.csv and NAME.nc (netCDF) into DIR.")
 @click.option(
     "--plot", "plots", multiple=True, callback=_axes, metavar="X,Y[,CURVES]", help="Draw column Y over X as SVG."
@@ -73,8 +73,8 @@ def sweep(
     file), young (pairs E1, E2, stress of the file), neumann_body, refine (halvings of the mesh), law, rule.  One row
     for each run goes to NAME.csv beside FILE, or into DIR.  Exit 0 also where runs failed: their rows say why.
 
-    Each row is kept in NAME.sqlite beside NAME.csv once it is made, and is not made again: after Ctrl-C, or whatever
-    ended the command, the same command goes on.  A row that ended in an error stays, too, until --retry or --fresh.
+    Each row is kept in NAME.sqlite beside NAME.csv and is not made again.  After Ctrl-C or a crash the same command
+    continues.  A row that ended in an error stays, too, until --retry or --fresh.
 
     \b
     Example of FILE:

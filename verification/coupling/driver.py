@@ -54,7 +54,7 @@ class CouplingError(RuntimeError):
 class Coupling:
     """The next force of a coupling whose loop is yours, and what its vectors show.
 
-    In *parallel* coupling its vectors have both fields, the force and behind it the displacement, of one length.  Each
+    In *parallel* coupling its vectors have both fields, first the force, then the displacement, of one length.  Each
     is measured by its first residual above 0, so that no unit counts.
 
     In a loop over time call :meth:`new_step` at the start of each step, and :meth:`see` for the last evaluation of it.
@@ -67,7 +67,7 @@ class Coupling:
     theta : number, optional
         The constant factor, or the first one, 0 < theta <= 1, and up to 100 of kind general; by default 1/2.
     kind : {'contact', 'tied', 'general'}
-        What the vectors are read as; contact has zeros where nodes are open, general may have positive feedback.
+        Kind of the coupling; contact has zeros where nodes are open, general may have positive feedback.
     parallel : bool
         True if both solvers run at once, each on the old data of the other.
     reuse : int
@@ -80,7 +80,7 @@ class Coupling:
     Raises
     ------
     ValueError
-        A rule that needs both bodies, or no such rule; no such kind; numbers outside their range.
+        The rule is unknown or needs both bodies, the kind is unknown, or a number is outside its range.
 
     Examples
     --------
@@ -356,14 +356,14 @@ def couple(
     tolerance : float
         The coupling ends where ``|Tg - g| <= tolerance |Tg|``, in the Euclidean norm.
     absolute : float
-        It ends as well where ``|Tg - g| <= absolute``, in the unit of g: where the solution is 0 nothing else does.
+        It also ends where ``|Tg - g| <= absolute``, in the unit of g.  If the solution is 0, only this ends it.
     parallel : bool
         True to call each solver with what the other one answered in the evaluation before, as if both ran at once.
         Force and displacement are relaxed together, and each must meet the tolerance.
     twice : bool
         True to evaluate T at the start once more: that shows the noise of the solvers, and whether they have a memory.
     max_iterations : int
-        The most evaluations of T, the one more of ``twice`` among them; fewer where the residual runs away.
+        Largest number of evaluations of T, with the additional one of ``twice``; fewer if the residual runs away.
     listen : callable, optional
         Called with a :class:`CouplingState` after each evaluation: ``print`` shows one line each.  Where it returns
         True the coupling ends here, with the outcome ``interrupted``.
@@ -371,7 +371,7 @@ def couple(
     Returns
     -------
     Coupled
-        Where its advice is to exchange the roles, the contact solver must take forces (fluxes) and return displacements
+        If its advice is to exchange the roles, the contact solver must take forces (fluxes) and return displacements
         (temperatures), and the Neumann solver the reverse: two other functions, not the two arguments swapped.
 
     Raises

@@ -118,7 +118,7 @@ def advise_logs(
     logs : iterable of tuple
         Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1 (100 of
         kind general); None
-        where the log names its factor, or the relaxation was not constant.
+        if the log names its factor, or if the relaxation was not constant.
     tied : bool
         True if the interface is tied, so that nothing opens or slips.  A run is linear then, and the softest or the
         stiffest mode sets its steady ratio: two logs mostly show both, and so the best theta,
@@ -150,7 +150,7 @@ def advise_logs(
         A theta outside its range, or none for a log that names none.
     ValueError
         No log, friction where nothing slips or in parallel coupling, kind general in parallel coupling, no such kind,
-        or a pattern or format that is none.
+        or an invalid pattern or format.
 
     Examples
     --------

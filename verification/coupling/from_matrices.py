@@ -86,8 +86,8 @@ def advise_matrices(
     Parameters
     ----------
     S1, S2 : array, sparse array, LinearOperator or callable
-        Schur complements of bodies 1 and 2 on the interface, or ``u -> S u``.  Symmetric, positive semidefinite; of a
-        matrix that is asymmetric by up to 0.001 of its largest entry the symmetric part is taken.  Without friction a
+        Schur complements of bodies 1 and 2 on the interface, or ``u -> S u``.  Symmetric, positive semidefinite.  If a
+        matrix is asymmetric by up to 0.001 of its largest entry, its symmetric part is taken.  Without friction a
         matrix may be asymmetric by more, as with convection, if its symmetric part is positive definite: eigenvalues
         are complex then, exact for a linear coupling, and nothing is proved.
     solve1, solve2 : callable, LinearOperator or matrix, optional
@@ -105,11 +105,11 @@ def advise_matrices(
     x : array, optional
         Positions of the nodes of the contact body, increasing.
     x_neumann : array, optional
-        Those of the Neumann body, where a transfer joins the grids and ``radius`` is given.
+        Positions of the nodes of the Neumann body, if a transfer joins the grids and ``radius`` is given.
     weights : array, optional
-        Of the quadrature on ``x``; of the trapezoid rule by default.
+        Weights of the quadrature on ``x``; by default the trapezoid rule.
     radius : number, optional
-        Of the hat kernel.
+        Radius of the hat kernel.
     kernel : array, optional
         The operator S of the law of friction as :func:`verification.build` takes it, in place of ``radius``.
     tied : bool
@@ -128,8 +128,8 @@ def advise_matrices(
     Raises
     ------
     ValueError
-        Matrices or operators that are not a stiffness, do not fit, or leave no role; no such kind, or kind general
-        with friction.
+        Matrices or operators that are not a stiffness, do not fit, or leave no role; an unknown kind, or kind
+        general with friction.
 
     Examples
     --------
@@ -216,7 +216,7 @@ def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[BodyNumb
     refused: dict[BodyNumber, Role] = {}
     if P is not None:
         n, c = other(P.neumann_body), P.neumann_body
-        why = f"needed a transfer of its own, from the unknowns of body {n} to those of body {c};"
+        why = f"needed its own transfer, from the unknowns of body {n} to those of body {c};"
         refused[n] = Role.refused(n, ValueError(f"{why} P' carries forces back, and no displacements"))
     for n, side in sides.items():
         c = other(n)

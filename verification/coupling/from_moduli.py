@@ -91,8 +91,8 @@ def advise_moduli(
     Raises
     ------
     HypothesisError
-        Numbers out of their range, data of two kinds, another kind of coupling than these data are of, or a mirror
-        image that cannot fit with these corners.
+        Numbers are out of their range, the data are of two kinds or do not fit the kind of coupling, or a mirror image
+        cannot fit with these corners.
 
     Examples
     --------

@@ -84,8 +84,8 @@ def advise_run(
     HypothesisError
         theta or the ratio is not a number in its range.
     ValueError
-        Friction where nothing slips, or in parallel coupling; no such kind; kind general in parallel coupling; earlier
-        runs of another kind.
+        Friction where nothing slips or in parallel coupling, an unknown kind, kind general in parallel coupling, or
+        earlier runs of another kind.
 
     Examples
     --------

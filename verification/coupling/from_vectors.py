@@ -15,8 +15,8 @@ def advise_vectors(
 ) -> Advice:
     """Advice from a few iterates x of a run and their images T x, the run being relaxed by any method.
 
-    T x is what the contact body answers to the displacement that the Neumann body has under the force x, before it is
-    relaxed; or any other quantity that is exchanged, as temperatures and fluxes.  Three to ten iterates are enough for
+    T x is the answer of the contact body to the displacement that the Neumann body has under the force x, before it is
+    relaxed.  Other quantities may be exchanged, as temperatures and fluxes.  Three to ten iterates are enough for
     most couplings.  While contact does not change, the differences of these vectors show eigenvalues of ``T``:
     :func:`verification.coupling.vectors.seen_in`.
 
@@ -44,7 +44,7 @@ def advise_vectors(
     Raises
     ------
     ValueError
-        Arrays of other shapes, entries that are not finite, iterates that do not differ, or no such kind.
+        Arrays of other shapes, entries that are not finite, iterates that do not differ, or an unknown kind.
 
     Examples
     --------

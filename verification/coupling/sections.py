@@ -51,7 +51,7 @@ AS_ABOVE = "your coupling, with the lines above"
 #: What it takes to exchange the roles of solvers that are already coupled.
 EXCHANGED = (
     "To exchange the roles, the second solver, which now reads displacements (temperatures), must take forces "
-    "(fluxes), and the first the reverse. To swap two arguments is not enough."
+    "(fluxes), and the first the reverse. Swapping two arguments is not enough."
 )
 
 
@@ -301,7 +301,7 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
             f"theta = {theta:.4g} = {formula}, and both errors: factor {near_one(rate)} a step",
         ]
     if spectrum.low + spectrum.error_low < 0 and not found.coupling.signed:
-        notes.append("An eigenvalue between -1 and 0 is positive feedback; a theta above 1 is no mistake there.")
+        notes.append("An eigenvalue between -1 and 0 is positive feedback; a theta above 1 is not a mistake there.")
     rows = [
         ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
         ("largest lambda, rho", largest, error),
@@ -440,7 +440,7 @@ def given(seen: Matrices) -> Section:
     if not seen.friction:
         said.append("Assumed: no friction.")
     if seen.ordering is None:
-        said.append("Ordering: any, so long as both have the same.")
+        said.append("Ordering: any, if both bodies have the same.")
     else:
         said.append(f"Ordering assumed: {seen.ordering}.")
     said += [f"Note: {words}." for words in seen.notes]

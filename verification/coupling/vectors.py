@@ -229,7 +229,7 @@ def seen_in(
     With an orthonormal basis U of the differences of the iterates, the eigenvalues of ``U' (1 + H) U`` lie between the
     ends of ``1 + H`` in the inner product in which H is selfadjoint, and nearly so in the Euclidean one.
 
-    A vector of *parallel* coupling has two fields of one length, one behind the other, of which each image depends on
+    A vector of *parallel* coupling has two fields of one length, one after the other, of which each image depends on
     the other one.  Each has its basis, so that no unit counts, and H is minus the product of both maps.
 
     Parameters

@@ -70,7 +70,7 @@ def build(
         and may be a table as in its file.
     neumann_body : {1, 2}
     obstacle : bool
-        Whether a rigid body may have the Neumann problem: :func:`verification.run` takes such a pair.
+        True if a rigid body may have the Neumann problem; :func:`verification.run` takes such a pair.
 
     Returns
     -------

@@ -148,10 +148,10 @@ class Law(ABC):
     outside : str
         Why the theorem does not apply to this law; empty where it does.
     needs_radius : bool
-        Whether a problem file with friction must give a radius.
+        True if a problem file with friction must give a radius.
     of_contact : bool
-        Whether it takes the forces of the contact grid where the grids differ.  They are no function of the forces g
-        on the Neumann grid, so that there only the global method can use it.
+        True if it takes the forces of the contact grid where the grids differ.  They are not a function of the forces
+        g on the Neumann grid, so that only the global method can use it there.
     """
 
     name: ClassVar[str]

@@ -57,7 +57,7 @@ class ContactPair(Value):
     settings : Settings
         Settings of a run, unless others are given.
     problem : Problem or None
-        The problem of the pair, for documents and messages; None where it was made from matrices.
+        The problem of the pair, for documents and messages; None if the pair was made from matrices.
     """
 
     contact: Condensed
@@ -338,7 +338,7 @@ def pair_from(
     like : ContactPair, optional
         Its condensed matrices are shared by bodies that are the same, or differ only in Young's modulus and loads.
     obstacle : bool
-        Whether the body with the Neumann problem may be rigid: it does not move, and only a run takes such a pair.
+        True if the body with the Neumann problem may be rigid: it does not move, and only a run takes such a pair.
 
     Raises
     ------

@@ -361,7 +361,7 @@ INEQUALITIES: tuple[Inequality, ...] = (
         lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=False)],
         about="bodies",
         squares=True,
-        remark=" (there of the contact body's lift alone, as nothing leads from its grid to the other one)",
+        remark=" (there only of the contact body's lift, as nothing leads from its grid to the other one)",
     ),
     Inequality("x-continuity", lambda b, r, _: b.largest, lambda b, r, _: b.continuity, about="bodies"),
     Inequality("x-lift-bound", _lifts, lambda b, r, _: b.contrast, about="bodies"),

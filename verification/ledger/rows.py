@@ -87,7 +87,7 @@ def verify(
     Raises
     ------
     ValueError
-        An id that no statement has, or another level.
+        An id is unknown, or the level.
 
     Examples
     --------

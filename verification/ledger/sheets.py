@@ -70,7 +70,7 @@ def _not_verified(ledger: Ledger) -> list[str]:
             found.setdefault(reason, []).append(f"`{id}`")
     if not found:
         return []
-    head = ["Some statements were checked in floating point alone:", "", "| statements | why |", "|---|---|"]
+    head = ["Some statements were checked only in floating point:", "", "| statements | why |", "|---|---|"]
     return [*head, *(f"| {', '.join(ids)} | {why} |" for why, ids in found.items()), ""]
 
 
@@ -159,7 +159,7 @@ def errata(ledger: Ledger) -> str:
         "G. Bayada, J. Sabil, T. Sassi, *Convergence of a Neumann-Dirichlet algorithm for two-body contact problems"
         " with non local Coulomb's friction law*, ESAIM: M2AN 42 (2008) 243-262. What follows mends the statement of"
         " the theorem and its proof. Each entry was decided by an exact counterexample, on random problems or by"
-        " reading; the proof of each repair stands in the ledger.",
+        " reading; the ledger has the proof of each repair.",
         "",
         *(
             f"{s.title}: {s.claims} (`{s.id}`, {row.verdict} in the ledger.)\n"

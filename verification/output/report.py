@@ -21,24 +21,24 @@ GLOSSARY = {
     "rho": "The largest stiffness of the contact body relative to the Neumann body, over all shapes of Gamma_c.",
     "edition": "A form of the theorem with the constants of this mesh. Printed: exactly as published. "
     "Repaired: with the factor 1/m that (5.30) lost.",
-    "energy": "The same proof in energy norms.",
+    "energy": "The bound by the proof of the theorem in energy norms.",
     "lmi": "The bound by semidefinite programs, from the conditions of contact and friction node by node. Its "
     "quadratic form is checked in floating point.",
-    "lyapunov": "The same in a norm that the proof chooses, not in (5.21).",
+    "lyapunov": "The bound in a norm that the proof chooses, instead of (5.21).",
     "verified, v": "The level of a number: it is proved for the exact data on this mesh, with all rounding errors "
     "bounded. A number without a mark was computed in doubles.",
-    "factor": "The number by which a bound says that one step multiplies the error at most.",
+    "factor": "The largest number by which one step multiplies the error, according to a bound.",
     "rate": "The number by which one step multiplies the error in the long run, observed or predicted.",
     "ratio": "The quotient of two successive residuals of the run.",
-    "residual": "How far the forces are from being reproduced by a step without relaxation.",
+    "residual": "The difference between the forces after a step without relaxation and the forces before it.",
     "decade": "A factor of ten.",
     "stick, slip, open": "A contact node touches and does not slide; touches and slides; does not touch.",
 }
 
 VERDICTS = {
     "consistent": "The largest ratio seen, rounding included, is below the bound, or attains it.",
-    "violated": "It is above: for a proved bound a bug or an error in the proof, for the printed one a finding; for "
-    "the forecast, that it missed.",
+    "violated": "The ratio is above the bound: for a proved bound a bug or an error in the proof, for the printed one "
+    "a finding. A violated forecast was wrong.",
     "inconclusive": "The difference is smaller than rounding.",
     "no conclusion": "The theorem draws no conclusion at this friction and theta.",
     "not computed": "No number was available to compare with the run; the reason is given.",

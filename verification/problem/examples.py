@@ -66,7 +66,7 @@ def example(name: str) -> Problem:
     Raises
     ------
     ValueError
-        An unknown name; the message lists the known ones.
+        The name is unknown; the message lists the known ones.
 
     Examples
     --------

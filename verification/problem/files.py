@@ -33,7 +33,7 @@ def load(path: Path | str) -> Problem:
     Raises
     ------
     ProblemError
-        Not a file, not readable, not TOML, or a value that does not fit.
+        The path is not a readable TOML file, or a value in it does not fit.
 
     Examples
     --------

@@ -34,8 +34,8 @@ _HERE = "value"
 class Problem(ProblemSpec):
     """A validated problem; see the problem file in the documentation.
 
-    Two problems are equal where all but their ``source`` is, the file that errors name; :attr:`digest` compares only
-    what changes a number.
+    Two problems are equal if all their values are, except ``source``, the file that errors name.  :attr:`digest`
+    compares only values that change a number.
 
     Examples
     --------

@@ -269,7 +269,7 @@ class BodySpec(Loads):
         "ends `[a, b]`, a < b; an obstacle may have none", ends, _needed, "length", initial=None, only=_drawn
     )
     y: Ends | None = entry(
-        "as `x`, along y", ends, _needed, "length", initial=None, only=lambda at: at["dimension"] == 2 and _drawn(at)
+        "the ends in y", ends, _needed, "length", initial=None, only=lambda at: at["dimension"] == 2 and _drawn(at)
     )
     cells: tuple[int, ...] | None = entry(
         "`[along x, along y]`, in one dimension one number",
@@ -627,7 +627,7 @@ class StepSpec(Entries):
 
     part = "Step"
 
-    name: str = entry("a text", label, lambda at: f"step {at['number']}", shown='`"step 1"`, ..')
+    name: str = entry("its name on screens", label, lambda at: f"step {at['number']}", shown='`"step 1"`, ..')
     increments: int = entry(
         f"number of equal increments, at most {MOST_INCREMENTS} in all steps", None, 1, "1", reader=_increments
     )
@@ -650,8 +650,8 @@ class StepSpec(Entries):
 class Units(Entries):
     """The table ``[units]``."""
 
-    length: str = entry("labels", label, "mm")
-    stress: str = entry("labels", label, "MPa")
+    length: str = entry("label of the unit of length", label, "mm")
+    stress: str = entry("label of the unit of stress", label, "MPa")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,8 +12,8 @@ from verification.show.parts import Labelled, Section, section
 
 #: What the lines of the answer mean.
 CAPTION = (
-    "What this run did; by which factor one step multiplies the error at most, whatever the loads; which theta is "
-    "predicted to be the best one, and which ones a bound allows."
+    "The result of this run; the largest factor by which one step multiplies the error, for any loads; the theta that "
+    "is predicted to be best, and the thetas that a bound allows."
 )
 
 
@@ -35,7 +35,7 @@ def answer(finished: Run, bounds: Sequence[BoundResult], *, alone: bool = True) 
 
 
 def _seen(finished: Run) -> str:
-    """How the run ended, and its rate."""
+    """Outcome of the run, and its rate."""
     count = f"{finished.iterations} step{'s' * (finished.iterations != 1)}"
     steps = f"{finished.outcome.words} after {count}"
     if finished.observed_growth is not None:

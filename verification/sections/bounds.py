@@ -30,8 +30,8 @@ DERIVED = ("C_T", "C0", "C1", "C2", "C3", "C4", "C5", "C6")
 #: The caption of the table of bounds.
 CAPTION = (
     "Each bound that follows from the constants: the friction k below which every small theta, and some theta, "
-    "contracts; the theta allowed at the friction of this problem; by which factor one step of this run multiplies the "
-    "error at most."
+    "contracts; the theta allowed at the friction of this problem; the largest factor by which one step of this run "
+    "multiplies the error."
 )
 
 

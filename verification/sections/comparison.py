@@ -39,16 +39,16 @@ from verification.show.parts import (
 
 #: The captions of the table of verdicts and of the figure of the losses.
 RATIOS = (
-    "Each bound beside the largest ratio of successive residuals in the norm (5.21), in which forces count by the "
-    "energy that they store in the Neumann body; forecast: what was said half way, beside the end of the run."
+    "Each bound is compared with the largest ratio of successive residuals in the norm (5.21), which measures forces "
+    "by their energy in the Neumann body. The forecast made half way is compared with the end of the run."
 )
 WATERFALL = (
     (
         "waterfall",
-        "What the inequalities of the proof lose, in powers of ten. At the top each one stands by itself, at the pair "
-        "of forces that comes closest to equality; these pairs differ, so these bars do not add up. Below it one "
-        "quantity is followed step by step to its bound in each panel, and the bars add up; what leads from the "
-        "repaired to the printed bound is only the unit of stress.",
+        "Losses of the inequalities of the proof, in powers of ten. The top panel shows each inequality by itself, at "
+        "the pair of forces that comes closest to equality. These pairs differ, so these bars do not add up. Each "
+        "panel below follows one quantity step by step to its bound, and its bars add up. The repaired and the "
+        "printed bound differ only by the unit of stress.",
     ),
 )
 
@@ -56,8 +56,8 @@ WATERFALL = (
 RULER = (
     (
         "ruler",
-        "The steps after which the error is at most the tolerance times the first one, as each bound promises them for "
-        "any loads; the steps that the linearisation at the solution predicts; and the steps of this run.",
+        "Steps until the error is at most the tolerance times the first one: promised by each bound for any loads, "
+        "predicted by the linearisation at the solution, and taken by this run.",
     ),
 )
 
@@ -146,7 +146,7 @@ class Parts(Listener):
             *(f"{r.name}: {r.not_computed}" for r in results if not r.worked_out),
         ]
         title = "WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?"
-        caption = "The same for the bound that takes the matrices of the bodies."
+        caption = "These columns for the bound that takes the matrices of the bodies."
         if parts:
             self.show((section("programs", title, *parts, caption=caption, pictures=FACTOR),))
 

@@ -72,7 +72,7 @@ def sections(measured: Measured) -> Sections:
     unsafe = "for the continuous theorem both err on the unsafe side"
     then = following("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
     title = "WHICH CONSTANTS DOES THE THEOREM USE?"
-    caption = "The constants on this mesh: those of Section 5, then rho and those of the theorem in energy norms."
+    caption = "The constants on this mesh: first Section 5, then rho and the theorem in energy norms."
     return (
         setting(problem, measured.nodes, measured.interface_nodes, measured.cuts),
         section("all constants", title, *parts, caption=caption),

@@ -14,8 +14,8 @@ from verification.show.parts import Cell, Note, Quantity, Sections, Shown, follo
 
 #: What the table of a history shows.
 STEPS = (
-    "One row a step: its increments, the steps that their runs took, and at its end the forces between the bodies, the "
-    "nodes that stick, slip and are open, and the work of friction in the step."
+    "Each row is a step: its increments, the steps that their runs took, and the work of friction. The forces between "
+    "the bodies, and the nodes that stick, slip and are open, are those at its end."
 )
 PROMISE = "WHAT DOES THE THEOREM SAY OF EACH INCREMENT?"
 PICTURES = (

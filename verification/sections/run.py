@@ -34,8 +34,8 @@ AT_POINTS = "WHAT HAPPENS AT THE POINTS?"
 
 #: What the table of a run shows, and its figures.
 RATES = (
-    "The rate by which one step multiplies the error in the long run, and the steps to the tolerance: as forecast half "
-    "way, as computed at the solution, and as seen."
+    "The rate by which one step multiplies the error in the long run, and the steps to the tolerance: forecast half "
+    "way, computed at the solution, and observed."
 )
 PICTURES = (
     ("residuals", "The residual step by step (points), and how each bound proves that it falls (lines)."),

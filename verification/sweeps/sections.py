@@ -49,7 +49,7 @@ def sections(found: Sweep, target: Path | None = None) -> Sections:
     return (
         section("setting", "", Facts(_title(found.problem), (runs,))),
         section(id, title, rows, *notes),
-        closing("anything about a theta between those of the grid", then=then),
+        closing("anything about a theta between two of the grid", then=then),
     )
 
 

@@ -154,7 +154,7 @@ def sweep(
     law : list of str, optional
         Friction laws by name: 'nonlocal', 'local', 'local-contact'.
     radius : list of number, optional
-        Of the kernel of S, length.
+        Radius of the kernel of S, length.
     rule : list of Rule or str, optional
         Relaxation rules, or their names: 'constant', 'aitken', 'anderson', 'newton', 'momentum'.
     jobs : int
