@@ -277,10 +277,10 @@ def _faces(read: Any, faces: Faces) -> Iterator[tuple[str, Ints]]:
     """Edges of the surfaces of an Abaqus file: faces 1, 2, .. of its plane elements, or its line elements."""
     sets = {name.upper(): of for name, of in read.cell_sets_dict.items()}
     for i, ((surface, face), listed) in enumerate(faces.items()):
-        numbers = sets.get(f"{HIDDEN}{i}".upper(), {}).values()
+        elements = {int(one) for one in listed if one.isdecimal()}
         if lost := [one for one in listed if not one.isdecimal() and one.upper() not in sets]:
             raise NotRead(f"its surface {surface[:SAID]} lists {lost[0][:SAID]}, which is no element set of it")
-        if sum(map(len, numbers)) < len({int(one) for one in listed if one.isdecimal()}):
+        if sum(map(len, sets.get(f"{HIDDEN}{i}".upper(), {}).values())) < len(elements):
             raise NotRead(f"its surface {surface[:SAID]} lists an element that it does not have")
         for kinds in {name.upper(): sets.get(name.upper(), {}) for name in (f"{HIDDEN}{i}", *listed)}.values():
             for kind, members in kinds.items():

@@ -190,9 +190,9 @@ class Vectors(Evidence, Value):
             share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
             return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
         if self.period:
-            causes = self.kind.given("contact that opens and closes, ") + "solvers that are not linear, or theta at its"
-            rather = f"{causes} limit. A smaller theta helps only in the last case; IQN-ILS or another start may in all"
-            return f"no progress: the iterates come back after {self.period} steps, which these make: {rather}"
+            contact = self.kind.given("contact that opens and closes, ")
+            causes = f"{contact}solvers that are not linear, or theta at its limit, where a smaller one helps"
+            return f"no progress: the iterates come back after {self.period} steps, which these make: {causes}"
         if self.kind.parallel and (self.noise or 0.0) > 1:
             needed = "needed both fields in a row, their images likewise, and solvers with less noise"
             return f"images do not follow from the other field: {needed}"

@@ -193,18 +193,18 @@ def proofs(result: Comparison) -> Sections:
         rows.append((name, says, factor(bound.factor, bound.one_minus_factor), _most(steps), WORDS[verdict.verdict]))
     parts: list[Shown] = []
     for words, names in without.items():
-        too = "".join(f"; {', '.join(names[:-1])} too" for _ in names[1:2])
+        too = f"; {', '.join(names[:-1])} too" * (len(names) > 1)
         why = f"{names[-1]}: {result.verdicts[names[-1]].reason}{too}"  # each has another reason
         parts.append(Labelled(words, ", ".join(names) if result.run.outside else why))
-    others = ((NAMES[name], judged) for name, judged in result.verdicts.items() if name in NAMES)
-    parts += [Labelled(name, f"violated: {each.reason}") for name, each in others if each.verdict == "VIOLATED"]
+    wrong = {n: j.reason for n, j in result.verdicts.items() if j.verdict == "VIOLATED"}
+    parts += [Labelled(NAMES[n], f"violated: {wrong[n]}") for n in wrong.keys() & NAMES]
     if rows:
         known = "v: verified" if any(bound.marked for bound in result.bounds.values()) else "in doubles"
         to = f"steps to {tolerance:.0e}".replace("e-0", "e-")
         parts.append(table((f"bound, {known}", "one step", "factor", to, "the run"), rows))
-    *limit, last = verdicts(result)[-1].parts
+    *limit, last = (end := verdicts(result)[-1]).parts
     more = [] if len(rows) == len(result.bounds) else [Note("All numbers: --full.", 0, only="terminal")]
-    return section("answer", "", *parts), replace(verdicts(result)[-1], parts=(*limit, *more, last))
+    return section("answer", "", *parts), replace(end, parts=(*limit, *more, last))
 
 
 def _most(steps: int | None) -> Cell:
