@@ -98,7 +98,7 @@ BOUNDS = click.option(
     "Without lmi the command is fast.",
 )
 
-FULL = click.option("--full", is_flag=True, help="Show all numbers; the first screen has about 15 lines.")
+FULL = click.option("--full", is_flag=True, help="Show all numbers; the first screen has at most 15 lines.")
 
 THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, instead of the file's.")
 SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Exchange the roles of the bodies.")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ndtheory import EnergyBounds
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
+from verification.show.layout import LABEL, WIDTH
 from verification.show.numbers import factor, figures, interval, near_one
 from verification.show.parts import Labelled, Section, section
 
@@ -15,6 +16,9 @@ CAPTION = (
     "The result of this run; the largest factor by which one step multiplies the error, for any loads; the theta that "
     "is predicted to be best, and the thetas that a bound allows."
 )
+
+#: Letters of a labelled text on one line of a screen.
+ONE_LINE = WIDTH - LABEL - 2
 
 
 def answer(finished: Run, bounds: Sequence[BoundResult], *, alone: bool = True) -> Section:
@@ -44,7 +48,9 @@ def _seen(finished: Run) -> str:
         return f"{steps}, too few to see a rate"
     if finished.observed_rate is None or finished.outcome == "stalled":
         return steps
-    return f"{steps}, each leaving {near_one(finished.observed_rate.value)} of the error"
+    rate = near_one(finished.observed_rate.value)
+    says = f"{steps}, each leaving {rate} of the error"
+    return says if len(says) <= ONE_LINE else f"{steps}; a step leaves {rate}"
 
 
 def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:

@@ -72,6 +72,9 @@ WORDS: Mapping[RunVerdict, str] = {
     "NOT_COMPUTED": "not computed",
 }
 
+#: Lines on bounds beside which the first screen has room to name what shows more, in 15 lines.
+MOST_BOUNDS = 5
+
 #: Verdicts that are not on a bound, as they are read.
 NAMES: Mapping[str, str] = {"linearised": "forecast"}
 
@@ -171,7 +174,7 @@ class FirstParts(Parts):
 
 @registry.screen.register
 def first(result: Comparison) -> Sections:
-    """The first screen, of about 15 lines: does it converge, how fast, proved by what, which theta, what next?"""
+    """The first screen, of at most 15 lines: does it converge, how fast, proved by what, which theta, what next?"""
     if result.problem is None:
         return ()
     found: list[Section] = []
@@ -203,7 +206,8 @@ def proofs(result: Comparison) -> Sections:
         to = f"steps to {tolerance:.0e}".replace("e-0", "e-")
         parts.append(table((f"bound, {known}", "one step", "factor", to, "the run"), rows))
     *limit, last = (end := verdicts(result)[-1]).parts
-    more = [] if len(rows) == len(result.bounds) else [Note("All numbers: --full.", 0, only="terminal")]
+    room = len(rows) + len(parts) - bool(rows) < MOST_BOUNDS
+    more = [Note("All numbers: --full.", 0, only="terminal")] * room
     return section("answer", "", *parts), replace(end, parts=(*limit, *more, last))
 
 
