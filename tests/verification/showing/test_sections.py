@@ -99,13 +99,9 @@ def test_every_kind_of_result_that_has_sections_is_among_these(results):
 
 def test_a_terminal_and_a_notebook_show_every_title_and_every_number(results):
     for name, result in results.items():
-        first = registry.screen(result)
-        view, screen, full = (
-            page_words(result._repr_html_()),
-            words(terminal(first)),
-            words(terminal(result.sections())),
-        )
-        for place, page, given in (("notebook", view, first), ("terminal", full, result.sections())):
+        every, first = result.sections(), registry.screen(result)
+        view, screen, full = page_words(result._repr_html_()), words(terminal(first)), words(terminal(every))
+        for place, page, given in (("notebook", view, first), ("terminal", full, every)):
             sections = shown(given, place)
             assert sections, name
             missing = [found for each in sections for found in texts(each) if found not in page]
