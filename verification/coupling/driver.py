@@ -320,7 +320,7 @@ class Coupled(Value):
 
     @property
     def summary(self) -> str:
-        why = "" if self.advice is None or self.advice.vectors is None else self.advice.vectors.negative
+        why = "" if self.advice is None else self.advice.evidence.negative
         end = f"{self.outcome.words}, {self.iterations} evaluations, residual {self.history[-1]:.1e}"
         return f"{end}, but {why}" if why else end
 

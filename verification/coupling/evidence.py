@@ -163,6 +163,11 @@ class Evidence(Part, ABC):
         return ""
 
     @property
+    def negative(self) -> str:
+        """Why eigenvalues below 0 leave no theta; empty where there are none of these."""
+        return ""
+
+    @property
     def summary(self) -> str:
         """One line where no theta follows."""
         return self.why_no_theta
