@@ -121,6 +121,7 @@ INSIDE = (
     ("verification.free_norm.bound", "verification.free_norm", "the calculator has bounds and no arrays"),
     ("verification.free_norm.bound", "verification.semidefinite", "the calculator has bounds and no arrays"),
     ("verification.free_norm.bound", "verification.certificate", "proofs are loaded once they are asked for"),
+    ("verification.semidefinite.lipschitz", "verification.certificate", "proofs are loaded once they are asked for"),
     ("verification.ledger.rows", "verification.ledger.sources", "records are read without sympy, which takes a second"),
     ("verification.output.folder", "verification.figures", "matplotlib is loaded once there is something to draw"),
     ("verification.output.fields", "meshio", "half a second; only a folder needs it"),

@@ -120,14 +120,14 @@ def __dir__() -> list[str]:
     return __all__
 
 
-#: The modules that fill each table of :mod:`verification.registry`: all entries under "", or what is shown of the
-#: classes of a module.
+#: The modules that fill each table of :mod:`verification.registry`: all entries under "", one entry under its name, or
+#: what is shown of the classes of a module.
 FILLS: dict[str, dict[str, tuple[str, ...]]] = {
     "laws": {"": ("interface.friction",)},
     "rules": {"": ("algorithm.relaxation",)},
     "bounds": {"": ("bounds.table", "semidefinite.bound", "free_norm.bound")},
     "log formats": {"": ("coupling.log_formats",)},
-    "proofs": {"": ("certificate.proved_constants", "semidefinite.losses")},
+    "proofs": {"constants": ("certificate.proved_constants",), "losses": ("semidefinite.losses",)},
     "documents": {
         "": (
             "algorithm.history",

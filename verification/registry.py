@@ -47,6 +47,7 @@ class Registry(MutableMapping[str, V]):
         return self._entries
 
     def __getitem__(self, name: str) -> V:
+        load(self._table, name)
         return self._filled()[name]
 
     def __setitem__(self, name: str, entry: V) -> None:

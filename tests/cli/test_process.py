@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from import_graph import FILES as MODULES
 from processes import COMMAND, PATIENCE, SKETCHED, UNDRAWN, ended, environment, running
 from strategies import AT_NIGHT
 
@@ -50,6 +51,25 @@ def test_what_needs_no_arrays_starts_without_them_and_a_run_without_a_folder_dra
     assert set(missing) <= {"numpy", "scipy"}  # a file may be missing after they came
     assert "numpy" in run
     assert "matplotlib" not in run
+
+
+#: Calls the command, and says on stderr which modules are there by then.
+COUNTED = """
+    import sys
+    from verification.cli import main
+
+    assert main(sys.argv[1:]) in (0, 3)
+    print("", *sys.modules, sep="\\t", file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize("arguments", [["compare", "FILE"], ["region", "FILE", "-o", "plane.svg"]])
+def test_no_command_about_a_problem_loads_more_than_half_of_the_modules(write, tmp_path, monkeypatch, arguments):
+    """These two load the most, of those that draw no folder."""
+    monkeypatch.chdir(tmp_path)
+    found = start(*(write() if a == "FILE" else a for a in arguments), code=COUNTED)
+    (loaded,) = (MODULES.keys() & line.split("\t") for line in found.stderr.splitlines() if line.startswith("\t"))
+    assert len(MODULES) / 4 < len(loaded) <= len(MODULES) / 2
 
 
 def test_ctrl_c_ends_the_process_with_130_and_a_document(write):

@@ -12,7 +12,7 @@ from ndtheory.statements import proof_of, statements
 from ndtheory.texts import nearest
 from verification.cli.console import complain, deliver, long_stages, say, stages
 from verification.cli.forms import cli
-from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf, one_file
+from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf, one_file, writer
 from verification.machine.interrupts import term_interrupts
 
 
@@ -51,7 +51,6 @@ def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path |
         return 0
     from verification.ledger import verify as check
     from verification.ledger.sections import sections
-    from verification.output.folder import writer
 
     write = writer(folder, "verify")
     try:
@@ -126,7 +125,6 @@ def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | 
       ndtheory reproduce fig5
       ndtheory reproduce all --jobs 2 -o section6
     """
-    from verification.output.folder import writer
     from verification.reproduce import FIGURES, READINGS
     from verification.reproduce import reproduce as run_again
     from verification.reproduce.experiments import size_of

@@ -10,7 +10,7 @@ import click
 
 from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import cli
-from verification.cli.options import FOLDER, JSON, RUN, OneOf, Typed, of_a_file
+from verification.cli.options import FOLDER, JSON, RUN, OneOf, Typed, of_a_file, writer
 from verification.cli.problems import complain_of, load
 
 if TYPE_CHECKING:
@@ -43,7 +43,6 @@ def march(typed: Typed, solver: Any, method: Any, folder: Path | None, as_json: 
     problem = load(typed)
     from verification.algorithm import history
     from verification.algorithm.runs import Run
-    from verification.output.folder import writer
     from verification.sections.history import sections
 
     write = writer(folder, "march")

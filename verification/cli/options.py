@@ -7,13 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from shlex import quote
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from ndtheory.texts import did_you_mean
 from verification.show.layout import nothing_typed
 from verification.show.parts import Next
+
+if TYPE_CHECKING:
+    from verification.output.files import Kind
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -116,6 +119,15 @@ def folder_name(context: click.Context, parameter: click.Parameter, value: str |
     if value == "":
         raise click.BadParameter("'': needed the name of a folder")
     return None if value is None else Path(value)
+
+
+def writer(path: Path | None, kind: Kind) -> Callable[[Any], None] | None:
+    """The function that writes a result into a folder, which is checked at once; None where none was named."""
+    if path is None:
+        return None
+    from verification.output.folder import Folder
+
+    return Folder(path, kind).write
 
 
 def one_file(

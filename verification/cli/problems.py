@@ -17,7 +17,7 @@ import click
 from ndtheory.keys import key
 from verification.cli.console import complain, deliver, one_by_one, progress, remember, say, stages, warn
 from verification.cli.forms import cli
-from verification.cli.options import BOUNDS, FOLDER, FULL, JSON, PATH, RUN, SWAP, Typed, folder_name, of_a_file
+from verification.cli.options import BOUNDS, FOLDER, FULL, JSON, PATH, RUN, SWAP, Typed, folder_name, of_a_file, writer
 from verification.document import Document
 
 if TYPE_CHECKING:
@@ -174,7 +174,6 @@ def run(typed: Typed, solver: Any, start: Path | None, folder: Path | None, as_j
     from verification.algorithm.start import forces
     from verification.coupling.matrix_files import read_vector
     from verification.interface.pair import pair_from
-    from verification.output.folder import writer
     from verification.sections.run import sections
 
     write = writer(folder, "run")
@@ -210,7 +209,6 @@ def solve(typed: Typed, folder: Path | None, as_json: bool) -> int:
     """
     from verification.algorithm import monolithic
     from verification.interface.assembly import discretise
-    from verification.output.folder import writer
     from verification.sections import run
 
     problem = load(typed)
@@ -301,7 +299,6 @@ def _compare(
 ) -> int:
     from verification import comparison as verdicts
     from verification.interface.pair import pair_from
-    from verification.output.folder import writer
     from verification.sections.comparison import FirstParts, Parts, proofs
     from verification.sections.comparison import verdicts as last
 

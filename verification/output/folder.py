@@ -129,11 +129,6 @@ class Folder:
             _text(room / "problem.toml", f"{MARKS['.toml'].decode()}\n{result.problem.to_toml()}")
 
 
-def writer(path: Path | None, kind: Kind) -> Callable[[Any], None] | None:
-    """Return the function that writes a result into a folder, which is checked at once; None where none was named."""
-    return None if path is None else Folder(path, kind).write
-
-
 def _reproduced(room: Path, found: Reproduction) -> None:
     """The rows behind each figure, and the figures."""
     for result in found.results:

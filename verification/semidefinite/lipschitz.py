@@ -25,7 +25,6 @@ from ndtheory.keys import Part, derived, key, says
 from ndtheory.number import above, below
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import ForceNorm
-from verification.certificate.claims import Confirmation, NoCertificate
 from verification.constants import Measured
 from verification.contact.active_set import Signs
 from verification.interface.pair import ContactPair
@@ -347,6 +346,8 @@ class Semidefinite(Part):
         The proved Lipschitz constant comes from a single program: its multipliers hold for all pieces of T at once, and
         one quadratic form decides.  A smaller one from dividing the pieces stays in ``divided``.
         """
+        from verification.certificate.claims import Confirmation, NoCertificate
+
         assert self.whole is not None
         found_beside = {"theta_max": self.theta_max, "friction_threshold": self.friction_threshold}
         numbers = {name: number for name, number in found_beside.items() if number is not None}
