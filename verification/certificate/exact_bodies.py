@@ -189,7 +189,7 @@ class ExactInterface:
         if law is None:
             return None
         contact = problem.contact
-        if law != LAWS[contact.law].of(contact.radius):
+        if law != LAWS[contact.law].of_file(contact):
             raise NotExact("the law of friction was given from Python, and not by exact numbers")
         interface = replace(self.pair.interface, contact=self.grid, neumann=self.other, join=self.join)
         try:

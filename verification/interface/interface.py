@@ -17,7 +17,7 @@ from fem1d2d.trace import SAME
 from ndtheory.keys import Part, key
 from verification.interface.join import ONE_GRID, Held, Join, joined
 from verification.interface.matrices import real_array
-from verification.problem.specs import Profile
+from verification.problem.specs import ContactSpec, Profile
 from verification.value import Value, copied, freeze, lent
 
 #: One truth value for each node, or for each component, of a grid.
@@ -164,6 +164,11 @@ class Law(ABC):
     def of(cls, radius: Fraction | None) -> Law | None:
         """Return the law of a problem file with that radius; None if it needs one and has none, without friction."""
         return cls()
+
+    @classmethod
+    def of_file(cls, contact: ContactSpec) -> Law | None:
+        """The law of a table of a problem file: one that takes other keys than the radius has its own way."""
+        return cls.of(contact.radius)
 
     def scaled(self, length: float) -> Law:
         """Return the same law in a unit of length in which lengths are ``length`` times as large numbers.

@@ -77,7 +77,7 @@ def join(
     """
     nodes, grids, P, gap = (_along_x if problem.contact.surface is None else _along_lines)(problem, meshes, known)
     contact, neumann = grids if problem.contact_body == 1 else grids[::-1]
-    law = law or LAWS[problem.contact.law].of(problem.contact.radius)
+    law = law or LAWS[problem.contact.law].of_file(problem.contact)
     support = _supported(known, nodes)[:: 1 if problem.contact_body == 1 else -1]
     interface = Interface.joining(contact, neumann, P, support, gap=gap, law=law, profile=problem.contact.profile)
     check_profile(problem, interface)
