@@ -183,10 +183,9 @@ def largest_strains(mesh: Cells, displacement: Floats, material: Material | None
     """
     found = []
     for _, slopes in _slopes(mesh, displacement):
-        if mesh.dimension == 1:
-            found.append(np.abs(slopes[:, 0, 0]))
-            continue
-        (xx, xy), (yx, yy) = np.moveaxis(slopes, 0, -1)
+        plane = np.zeros((2, 2, len(slopes)))
+        plane[: mesh.dimension, : mesh.dimension] = np.moveaxis(slopes, 0, -1)
+        (xx, xy), (yx, yy) = plane
         found.append(np.abs(xx + yy) / 2 + np.hypot((xx - yy) / 2, (xy + yx) / 2))
         if material is not None and material.thin:
             found.append(np.abs((xx + yy) * material.lame_lambda / (2 * material.lame_mu)))

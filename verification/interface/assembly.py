@@ -431,9 +431,10 @@ def _places(problem: Problem, body: Body) -> Iterator[NamedPlace]:
 
 def _check_extents(problem: Problem, name: str, mesh: Mesh | None) -> None:
     """Refuse a plane body so slender that tolerances of its extent hide it."""
-    if mesh is None or mesh.dimension == 1:
+    if mesh is None:
         return
-    across, along = sorted(np.ptp(mesh.points.astype(float), axis=0))
+    extents = np.ptp(mesh.points.astype(float), axis=0)
+    across, along = extents.min(), extents.max()
     if across < SLENDEREST * along:
         needed = f"its extents are {across:g} and {along:g}: needed a body less slender, from {SLENDEREST:g} on"
         raise problem.refuse(name, None, needed)

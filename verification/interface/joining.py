@@ -129,8 +129,7 @@ def _along_x(problem: Problem, meshes: list[Mesh | None], known: list[Supports |
     j = int(np.argmin(gap))
     height = min(float(np.ptp(mesh.points[:, -1].astype(float))) for mesh in meshes if mesh is not None)
     if gap[j] < -MOST_OVERLAP * height:
-        axis = "x" if problem.dimension == 1 else "y"
-        where = "" if problem.dimension == 1 else f"at x = {at[j]:g} "
+        axis, where = ("x", "") if problem.dimension == 1 else ("y", f"at x = {at[j]:g} ")
         low, high = (np.broadcast_to(level, at.shape)[j] for level in levels)
         needed = (
             f"the bodies lie in each other: {where}body 1 ends at {axis} = {low:g}, body 2 begins at {axis} ="

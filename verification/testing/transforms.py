@@ -65,22 +65,18 @@ def reflect(pair: ContactPair, force: Floats) -> Floats:
 
 
 def _reflected(grid: Grid, vector: Floats) -> Floats:
-    if grid.dimension == 1:
-        return vector.copy()
     return np.concatenate([-vector[grid.tangential][::-1], vector[grid.normal][::-1]])
 
 
 def mirrored(pair: ContactPair) -> ContactPair:
-    """The mirror image of a pair, x to -x, as a pair of matrices; bars are their own."""
+    """The mirror image of a pair, x to -x, as a pair of matrices; that of bars has the same matrices."""
     interface = pair.interface
-    if pair.contact.grid.dimension == 1:
-        return _of_matrices(pair, lambda side: side, interface.kernel)
 
     def side(given: Condensed) -> Condensed:
         grid = given.grid
         return replace(
             given,
-            grid=Grid(x=-grid.x[::-1], weights=grid.weights[::-1]),
+            grid=Grid(x=-grid.x[::-1], weights=grid.weights[::-1], dimension=grid.dimension),
             schur=_reflected(grid, _reflected(grid, given.schur).T),
             load=_reflected(grid, given.load),
             known=_reflected(grid, given.known),
