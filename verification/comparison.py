@@ -13,7 +13,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import StepRatio, largest_step_ratio
 from verification.algorithm.reference import Reference, by_cvxpy_alone
 from verification.algorithm.relaxation import Constant
-from verification.algorithm.runs import Run, check_memory, run
+from verification.algorithm.runs import Run, check_memory, run, unwatched
 from verification.algorithm.theta import Choice, choose
 from verification.bounds.bound import NOT_ASKED, BoundResult, Subject
 from verification.bounds.losses import Losses
@@ -200,7 +200,7 @@ def compare(
     exact: bool = False,
     verified: bool = False,
     bounds: Sequence[str] | str | None = None,
-    watch: Callable[[Iterate], None] = lambda state: None,
+    watch: Callable[[Iterate], None] = unwatched,
     progress: Progress = silent,
     listener: Listener | None = None,
 ) -> Comparison:
