@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ndtheory.number import typed
+from fractions import Fraction
+
+from ndtheory.number import decimal, typed
 from ndtheory.texts import printable
 
 #: Most characters of a value that a message repeats.
@@ -23,7 +25,10 @@ class HypothesisError(ValueError):
     """
 
     def __init__(self, key: str, value: object, needed: str) -> None:
-        text = printable(typed(value))  # one line, whatever was received
+        text = typed(value)
+        if isinstance(value, (float, Fraction)) and text in needed.split():  # 12 digits do not tell it from a limit
+            text = str(value if isinstance(value, float) else decimal(value))
+        text = printable(text)  # one line, whatever was received
         text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
         super().__init__(f"{key} = {text}: needed {needed}")
         self.key = key
