@@ -26,7 +26,7 @@ BUDGET = {
     "verification.contact": 1100,
     "verification.coupling": 8800,
     "verification.exploration": 850,
-    "verification.figures": 2000,
+    "verification.figures": 1800,
     "verification.free_norm": 1750,
     "verification.interface": 4900,
     "verification.ledger": 4950,

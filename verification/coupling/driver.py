@@ -320,9 +320,8 @@ class Coupled(Value):
 
     @property
     def summary(self) -> str:
-        why = "" if self.advice is None else self.advice.evidence.negative
         end = f"{self.outcome.words}, {self.iterations} evaluations, residual {self.history[-1]:.1e}"
-        return f"{end}, but {why}" if why else end
+        return f"{end}, but {why}" if self.advice and (why := self.advice.evidence.negative) else end
 
 
 def couple(

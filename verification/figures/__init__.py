@@ -6,26 +6,9 @@ Each is imported from its module when first asked for: a figure loads what it dr
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from matplotlib.figure import Figure as Figure
-
-if TYPE_CHECKING:
-    from verification.figures.best_theta import draw_best_theta as draw_best_theta
-    from verification.figures.bodies import draw_bodies as draw_bodies
-    from verification.figures.factor import draw_factor as draw_factor
-    from verification.figures.factor import draw_proved as draw_proved
-    from verification.figures.history import draw_history as draw_history
-    from verification.figures.proof_map import draw_map as draw_map
-    from verification.figures.region import draw_region as draw_region
-    from verification.figures.reproduction import draw_reproduction as draw_reproduction
-    from verification.figures.residuals import draw_residuals as draw_residuals
-    from verification.figures.ruler import draw_ruler as draw_ruler
-    from verification.figures.squares import draw_squares as draw_squares
-    from verification.figures.style import save as save
-    from verification.figures.sweep import draw_rules as draw_rules
-    from verification.figures.sweep import draw_sweep as draw_sweep
-    from verification.figures.waterfall import draw_waterfall as draw_waterfall
 
 #: The module of each name.
 _HOME = {
