@@ -38,7 +38,7 @@ OF_SIZE = f"of a size between 1e-{LARGEST_EXPONENT} and 1e{LARGEST_EXPONENT}"
 
 
 def typed(value: object) -> str:
-    """A value as a user would type it: numbers in 12 digits, fractions that are no decimals as such.
+    """A value as a user would type it: a number in 12 digits, or a fraction that is not a decimal.
 
     A double next to a whole number keeps all its digits, which say on which side it is.
     """

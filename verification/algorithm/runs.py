@@ -273,7 +273,7 @@ class Run(Document):
         if self.interrupted:
             return None, INTERRUPTED
         if not isinstance(self.rule, Constant):
-            return None, f"the {self.relaxation} relaxation is no constant theta"
+            return None, f"the {self.relaxation} relaxation does not keep theta constant"
         try:
             with one_thread():
                 return compute(), ""

@@ -114,7 +114,7 @@ def advise_moduli(
     """
     of = kind_of(kind, parallel=parallel)
     if not of.signed:
-        raise HypothesisError("kind", of.name, "contact or tied: moduli say nothing of other couplings")
+        raise HypothesisError("kind", of.name, "contact or tied: moduli give no advice on other couplings")
     waves = {
         "film": film,
         "conductivity": conductivity,

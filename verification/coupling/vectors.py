@@ -188,7 +188,7 @@ class Vectors(Evidence, Value):
         """The reason why these vectors do not belong to one map T; empty where they may."""
         if (self.apart or 0.0) > LOUD:
             share = f"two images of one iterate differ by {self.apart:.2g} of its residual"
-            return f"{share}: the solvers are too loose, or have a memory, so that T is no map of x"
+            return f"{share}: the solvers are too loose, or have a memory, so that T is not a function of x"
         if self.period:
             contact = self.kind.given("contact that opens and closes, ")
             causes = f"{contact}solvers that are not linear, or theta at its limit, where a smaller one helps"

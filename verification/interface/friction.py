@@ -107,7 +107,7 @@ class Nonlocal(Law):
             ]
         if share > 1 + SHARE:
             return [
-                f"contact.radius = {r:g} is no multiple of the mesh width {width:g}: sums of the kernel multiply"
+                f"contact.radius = {r:g} is not a multiple of the mesh width {width:g}: sums of the kernel multiply"
                 f" friction by about {share:.2f}"
             ]
         return []

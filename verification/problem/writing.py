@@ -112,4 +112,4 @@ def value(given: Any) -> str:
     if isinstance(given, Mapping):
         inside = ", ".join(f"{key(name)} = {value(v)}" for name, v in given.items())
         return f"{{ {inside} }}" if inside else "{}"
-    raise TypeError(f"{type(given).__name__} is no value of TOML")
+    raise TypeError(f"{type(given).__name__} is not a TOML value")

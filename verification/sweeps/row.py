@@ -372,7 +372,7 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, pieces: KnownPieces) -
     observed = None if outcome is Outcome.DIVERGED else went.rate(pieces.noise)
     if observed is None:
         diverged = outcome is Outcome.DIVERGED
-        reason["observed_rate"] = "the run diverged" if diverged else "too few steps stand clear of the rounding"
+        reason["observed_rate"] = "the run diverged" if diverged else "too few steps are clear of the rounding"
     end: Iterate | None = None
     coupled, linear = None, None
     try:
@@ -385,7 +385,7 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, pieces: KnownPieces) -
             reason["coupled_residual"] = NO_FORCE
     try:
         if not isinstance(rule, Constant):
-            raise NotLinear(f"the {rule.name} relaxation is no constant theta")
+            raise NotLinear(f"the {rule.name} relaxation does not keep theta constant")
         here, first = (end, went.entry) if end and outcome is Outcome.CONVERGED else (pieces.solution(), None)
         linear = linearised_rate(pieces.piece(here), here, float(choice.theta), first)
     except (NotLinear, SolveError, ContactError) as error:

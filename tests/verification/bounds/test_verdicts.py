@@ -274,4 +274,4 @@ def test_without_a_forecast_its_verdict_is_not_computed():
     problem = square_blocks(4)
     done = vf.run(replace(problem, iteration=replace(problem.iteration, relaxation="aitken"))).linearise()
     found = judge_forecast(done)
-    assert (found.verdict, found.reason) == ("NOT_COMPUTED", "the aitken relaxation is no constant theta")
+    assert (found.verdict, found.reason) == ("NOT_COMPUTED", "the aitken relaxation does not keep theta constant")

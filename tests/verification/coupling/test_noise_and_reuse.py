@@ -76,7 +76,7 @@ def test_a_solver_with_a_memory_is_told_and_gets_no_theta():
     advice = twice(remembers).advice
     assert advice.vectors.apart > LOUD
     assert (advice.theta, advice.roles) == (None, ())
-    assert "a memory, so that T is no map of x" in advice.why_no_theta
+    assert "a memory, so that T is not a function of x" in advice.why_no_theta
     assert "no theta above 0" not in advice.why_no_theta
 
 

@@ -243,7 +243,7 @@ def test_every_character_keeps_its_place_in_a_text_and_in_a_key(code):
 
 @pytest.mark.parametrize("value", [None, {1}, F(1, 2), b"a"])
 def test_what_toml_does_not_know_is_refused(value):
-    with pytest.raises(TypeError, match=f"{type(value).__name__} is no value of TOML"):
+    with pytest.raises(TypeError, match=f"{type(value).__name__} is not a TOML value"):
         toml({"x": [value]})
 
 

@@ -193,7 +193,7 @@ def test_a_radius_between_one_and_two_cells_that_adds_a_tenth_is_warned_of():
     fine = block("0.0133333")
     fine["body1"]["cells"], fine["body2"]["cells"] = [300, 2], [100, 2]
     (warning,) = of_the_kernel(fine)
-    assert "contact.radius = 0.0133333 is no multiple of the mesh width 0.01" in warning
+    assert "contact.radius = 0.0133333 is not a multiple of the mesh width 0.01" in warning
     assert "by about 1.12" in warning
 
 
