@@ -212,8 +212,7 @@ def read_observed(
     """
     r = ratio.value
     high = (1 + r) / theta - 1
-    falls = measured and 1 - ratio.most > 2 * (ratio.most - ratio.least)
-    readings = _readings(theta, ratio, high, kind, falls=falls)
+    readings = _readings(theta, ratio, high, kind, measured and 1 - ratio.most > 2 * (ratio.most - ratio.least))
     kinds = [reading.kind for reading in readings]
     best = predicted_theta(high)
     between = 2 / (high + Fraction(7, 4))  # above the best theta of mode-high, below the one at which it diverges
@@ -237,11 +236,8 @@ def read_observed(
     return readings, NextRun(theta=rounded_down(following), why=why), rho
 
 
-def _readings(theta: Fraction, ratio: Observed, value: Fraction, kind: Kind, *, falls: bool) -> tuple[RunReading, ...]:
-    """The readings of a ratio; ``value`` is the lambda of a mode that changes its sign.
-
-    What ``falls`` steadily is at no level, however slowly it falls.
-    """
+def _readings(theta: Fraction, ratio: Observed, value: Fraction, kind: Kind, falls: bool) -> tuple[RunReading, ...]:
+    """The readings of a ratio; ``value`` is lambda of a mode that changes its sign; what ``falls`` is at no level."""
     r, high, low = ratio.value, (1 + ratio.least) / theta - 1, (1 - ratio.most) / theta - 1
     fastest = f"the stiffest mode in this run has lambda = {few((1 + ratio.most) / theta - 1)} at most"
     given = kind.given("without friction, or tied, ")

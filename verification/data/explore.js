@@ -145,7 +145,7 @@ nd.onPage("explore", (figure) => {
     const map = new nd.Chart({ width: 360, height: 260, label: "The runs over theta and friction",
       x: { low: 0, high: 1, name: "theta" }, y: { low: -0.06 * (most || 1), high: 1.06 * (most || 1), name: "friction k" } });
     panel("All runs: theta and friction", map.root, nd.html("p", { class: "legend" },
-      "Circle: converged, the larger the fewer steps; cross: not. Filled region: a bound proves that one step contracts."));
+      "Circle: converged, the larger the fewer steps; cross: not. Filled region: by a bound one step contracts; the printed one is not proved."));
     const factors = new nd.Chart({ width: 360, height: 260, label: "Error per step over theta", x: { low: 0, high: 1, name: "theta" }, y: { low: 0, high: 1.5, name: "error per step" } });
     panel("Error per step at this friction", factors.root, nd.html("p", { class: "legend" },
       "Points: observed, of runs that converged. Dashed: predicted from rho, not a bound; its least value is marked. Line: bound in energy norms, in doubles, where it applies."));

@@ -32,6 +32,6 @@ def draw_ruler(found: Comparison) -> Figure:
         ax.set_yticks(range(len(marks)), [mark.name for mark in marks])
         ax.set_ylim(len(marks) - 0.4, -0.6)
         none = f"; no promise by {', '.join(silent)}" if silent else ""
-        ax.set_xlabel(f"steps to {tolerance:.0e} of the first error{none}")
+        ax.set_xlabel(f"steps to {tolerance:.0e}{none}")
         ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}, k = {float(run.pair.friction):g}")
     return figure

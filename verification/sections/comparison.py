@@ -56,8 +56,8 @@ WATERFALL = (
 RULER = (
     (
         "ruler",
-        "Steps until the error is at most the tolerance times the first one: promised by each bound for any loads, "
-        "predicted by the linearisation at the solution, and taken by this run.",
+        "Steps to the tolerance: until each bound promises the error to be that share of the first one, for any loads; "
+        "as the linearisation at the solution predicts them; and until the residual of this run was there.",
     ),
 )
 

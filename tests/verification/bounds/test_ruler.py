@@ -46,7 +46,7 @@ def test_the_marks_of_a_run_are_in_order_and_what_is_promised_covers_what_is_see
     assert marks["energy"].steps >= marks[OBSERVED].steps == found.run.iterations
     axes = draw_ruler(found).axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == list(marks)
-    assert axes.get_xlabel() == "steps to 1e-09 of the first error; no promise by printed, repaired"
+    assert axes.get_xlabel() == "steps to 1e-09; no promise by printed, repaired"
 
 
 def test_the_first_screen_shows_each_violation():
