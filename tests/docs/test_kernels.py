@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import pytest
 from processes import ended, environment
+from strategies import AT_NIGHT
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -42,6 +44,7 @@ warnings.warn("seen")
 """
 
 
+@pytest.mark.skipif(not AT_NIGHT, reason="three seconds: by night, and every build of the site begins pages so")
 def test_a_page_begins_as_in_a_new_kernel_and_ends_with_its_kernel(site_tools, tmp_path):
     pages = (SHOWN, "unknown", "import os; os._exit(3)", "print('the next one')")
     answer = ended(PAGES, DOCS, tmp_path, *pages, env=environment(PAGE="set"))

@@ -200,5 +200,5 @@ def test_operators_of_this_kind_are_refused():
 
 
 def test_moduli_say_nothing_of_this_kind():
-    with pytest.raises(HypothesisError, match="moduli say nothing"):
+    with pytest.raises(HypothesisError, match="moduli give no advice"):
         vf.advise_moduli(young=(1, 1), poisson=(0, 0), kind="general")

@@ -5,6 +5,7 @@ from fractions import Fraction as F
 import numpy as np
 import pytest
 from problem_list import blocks
+from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory.continuum.circle import TwoLayers
@@ -22,6 +23,7 @@ def layer(young, depth):
     return Strip(body=Moduli(young=young, poisson="0.3"), thickness=F(depth))
 
 
+@pytest.mark.skipif(not AT_NIGHT, reason="three seconds: by night")
 def test_the_numbers_are_those_of_the_calculator_of_layers():
     found = vf.advise(SECTION_6)
     one, other = found.layers
