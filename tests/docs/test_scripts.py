@@ -65,7 +65,7 @@ def test_a_script_that_is_too_long_or_lacks_something_is_found(old, new):
 
 @pytest.fixture
 def scripts(site_tools):
-    pytest.importorskip("sphinx_gallery")
+    pytest.importorskip("sphinx_gallery", reason="the tools of the site are not installed: make docs")
     sys.path.append(str(DOCS))
     try:
         from builder import scripts

@@ -205,7 +205,7 @@ def proofs(result: Comparison) -> Sections:
         known = "v: verified" if any(bound.marked for bound in result.bounds.values()) else "in doubles"
         to = f"steps to {tolerance:.0e}".replace("e-0", "e-")
         parts.append(table((f"bound, {known}", "one step", "factor", to, "the run"), rows))
-    *limit, last = (end := verdicts(result)[-1]).parts
+    *limit, last = (end := _limits(result)).parts
     room = len(rows) + len(parts) - bool(rows) < MOST_BOUNDS
     more = [Note("All numbers: --full.", 0, only="terminal")] * room
     return section("answer", "", *parts), replace(end, parts=(*limit, *more, last))
@@ -222,9 +222,11 @@ def verdicts(result: Comparison) -> Sections:
         ("bound", "verdict", "why"), [(NAMES.get(n, n), WORDS[j.verdict], j.reason) for n, j in result.verdicts.items()]
     )
     title = "DOES THE RUN AGREE WITH THE BOUND?"
-    return section("verdicts", title, judged, caption=RATIOS, pictures=RULER), limits(
-        result.run.outside, then(result.run, "run", following("advise"))
-    )
+    return section("verdicts", title, judged, caption=RATIOS, pictures=RULER), _limits(result)
+
+
+def _limits(result: Comparison) -> Section:
+    return limits(result.run.outside, then(result.run, "run", following("advise")))
 
 
 @registry.sections.register
