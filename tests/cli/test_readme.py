@@ -88,5 +88,5 @@ def test_the_readme_has_a_formula_for_bodies_that_touch_and_one_for_tied_ones_an
 
     low, high = 2.78, 36.0
     tied, touching = (steps(tied_factor(theta, low, high)) for theta in (tied_theta(low, high), predicted_theta(high)))
-    told = f"from {low} to {high} this takes {tied} steps to an error of 1e-9, and 2/(2 + rho) takes {touching}."
+    told = f"from {low} to {high}, this theta needs {tied} steps to an error of 1e-9, and 2/(2 + rho) needs {touching}."
     assert told in " ".join(README.split())

@@ -106,15 +106,20 @@ class Advice(Document):
         tied = self.tied and best.ends is not None
         theta, rate = self.chosen(best)
         first = "" if self.evidence.assumes is None else f"Assumed: {self.evidence.assumes}. "
-        of = "rho (stiffness of contact body over Neumann body on the interface, at worst)"
-        first += f"{of if self.coupling.signed else 'rho (the largest eigenvalue lambda)'} is {_rho(best, tied)}"
+        of, least = "rho (the largest eigenvalue lambda)", "rho_min (the least)"
+        if best.spectrum is not None and not best.spectrum.real:
+            of, least = "the largest real part of the eigenvalues, which are complex,", "the least real part"
+        elif self.coupling.signed:
+            of = "rho (stiffness of contact body over Neumann body on the interface, at worst)"
+            least = "rho_min (at best)"
+        first += f"{of} is {_rho(best, tied)}"
         if self.neumann_body is not None:
             words = self.evidence.words(self.neumann_body)
             first += f" with {words} as Neumann {words.split()[0]}"
         if other is not None:
             first += f", {_rho(other, tied)} with the roles exchanged"
         if tied and best.rho_min is not None:
-            first += f"; rho_min ({'at best' if self.coupling.signed else 'the least'}) is {best.rho_min.value:.3g}"
+            first += f"; {least} is {best.rho_min.value:.3g}"
         if self.next is not None and abs(self.theta - theta) > SAME_THETA * theta:
             return f"{first}. So relax by theta = {self.theta:.4g}: {self.next.why}."
         bound = "about " if best.level == "estimated" else "at most " * (tied or best.proved)
@@ -136,8 +141,11 @@ class Advice(Document):
         forms = {"1/(1+rho)": 1 / (1 + rho)} if self.coupling.parallel else {"2/(2+rho)": 2 / (2 + rho)}
         if least is not None and self.tied and not self.coupling.parallel:
             forms = {"2/(2+rho_min+rho)": 2 / (2 + least + rho)} | forms
-        near = (form for form in forms if abs(forms[form] - theta) <= SAME_THETA * theta)
-        of = "fewest steps" if role.spectrum is not None and role.spectrum.real else "least factor"
+        real = role.spectrum is not None and role.spectrum.real
+        near = (
+            form for form in forms if (real or role.spectrum is None) and abs(forms[form] / theta - 1) <= SAME_THETA
+        )
+        of = "fewest steps" if real else "least factor"
         return next(near, f"the theta of {of} over the eigenvalues and their errors")
 
     methods: tuple[MethodRow, ...] = key(

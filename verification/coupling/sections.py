@@ -282,9 +282,9 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     yield section("given", "WHAT WAS GIVEN?", *said)
     if not found.roles:
         return
-    largest, error = figures(spectrum.high), figures(spectrum.error_high, 2)
+    largest, errors = figures(spectrum.high), [figures(each, 2) for each in seen.estimated_errors]
     if found.theta is None:
-        largest, error = Quantity(spectrum.high, f">= {rounded(spectrum.high, 4, up=False)}"), "not found"
+        largest, errors[1] = Quantity(spectrum.high, f">= {rounded(spectrum.high, 4, up=False)}"), "not found"
         notes = [f"No theta: {found.why_no_theta}."]
         if found.method is not None:
             notes.append("With the roles exchanged theta depends on the least eigenvalue, which is found.")
@@ -296,15 +296,18 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
         )
         if found.coupling.parallel:
             formula = "1/(1 + largest)" if spectrum.low >= 0 else "the theta of least factor over both square roots"
+        errors_of = "errors are estimates, for a linear T"
+        if None in seen.estimated_errors:
+            errors_of = "no error is known, as contact changes in these iterates, or friction acts"
         notes = [
-            "Ritz values: eigenvalues as these vectors show them, from inside; errors are estimates, for a linear T.",
+            f"Ritz values: eigenvalues as these vectors show them, from inside; {errors_of}.",
             f"theta = {theta:.4g} = {formula}, and both errors: factor {near_one(rate)} a step",
         ]
     if spectrum.low + spectrum.error_low < 0 and not found.coupling.signed:
         notes.append("An eigenvalue between -1 and 0 is positive feedback; a theta above 1 is not a mistake there.")
     rows = [
-        ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
-        ("largest lambda, rho", largest, error),
+        ("least lambda" if spectrum.real else "least real part", figures(spectrum.low), errors[0]),
+        ("largest lambda, rho" if spectrum.real else "largest real part", largest, errors[1]),
     ]
     yield section("theta", "WHICH EIGENVALUES, AND WHICH THETA?", table(("", "lambda", "error"), rows), *notes)
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,12 @@ WRONG_SIGN = (
     "return the force that acts on the first body), or positive feedback (kind general)"
 )
 
+_ERRORS = "estimated errors of both ends"
+_UNKNOWN: dict[str, Any] = {
+    "unit": "1",
+    "null": "of contact with complex eigenvalues",
+    "why": "the eigenvalues are complex: contact changes, or friction acts, and then no error is known",
+}
 _COUNTS = "length of a vector, number of iterates, of those that were read, and of their independent differences"
 
 
@@ -100,8 +107,8 @@ class Vectors(Evidence, Value):
         of=lambda ritz: [{"real": float(v.real), "imaginary": float(v.imag)} for v in ritz],
     )
 
-    error_low = derived("estimated errors of both ends", lambda vectors: vectors.spectrum.error_low, float, unit="1")
-    error_high = derived("estimated errors of both ends", lambda vectors: vectors.spectrum.error_high, float, unit="1")
+    error_low = derived(_ERRORS, lambda vectors: vectors.estimated_errors[0], float, **_UNKNOWN)
+    error_high = derived(_ERRORS, lambda vectors: vectors.estimated_errors[1], float, **_UNKNOWN)
 
     symmetric: bool = key("whether the eigenvalues are real")
     changing: bool = key("whether nodes open or close between the iterates", name="contact_changes")
@@ -129,6 +136,15 @@ class Vectors(Evidence, Value):
     def seen(self) -> Spectrum:
         """The spectrum, with a mode for open nodes where one of them bore a force."""
         return self.spectrum.with_open_nodes() if self.loaded and not self.linear else self.spectrum
+
+    @property
+    def estimated_errors(self) -> tuple[float, float] | tuple[None, None]:
+        """Errors of both ends; None where contact is not known to be the same in the iterates.
+
+        Complex eigenvalues show that: a slip that begins or ends leaves no other trace.
+        """
+        one = self.kind.linear or self.symmetric
+        return (self.spectrum.error_low, self.spectrum.error_high) if one else (None, None)
 
     @property
     def linear(self) -> bool:

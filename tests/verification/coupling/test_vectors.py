@@ -150,6 +150,24 @@ def test_a_coupling_that_is_not_symmetric_has_complex_eigenvalues_and_a_theta_fo
     factors = np.abs(1 - grid[:, None] * (1 + coupling.values)).max(axis=1)
     assert found.theta == pytest.approx(grid[factors.argmin()], abs=2e-3)
     assert "not symmetric" in str(found.sections())
+    assert "real part" in found.quote
+    assert "rho" not in found.quote
+
+
+def test_complex_eigenvalues_of_contact_have_no_error_that_is_known():
+    """Section 6 with friction: slip changes in the first steps, and the eigenvalue 1.14 found from all is none of T."""
+    problem = vf.example("section6")
+    for friction, known in (("0.2", False), ("0", True)):
+        made = vf.run(problem.changed(friction=friction), theta="0.5")
+        found = vf.advise_vectors([each.g for each in made.iterates], [each.image for each in made.iterates])
+        assert (found.vectors.symmetric, found.vectors.error_high is not None) == (known, known)
+        assert ("no error is known" in str(found.sections())) is not known
+        assert ("rho (stiffness" in found.quote) is known
+    rho = vf.measure(problem.changed(friction="0")).rho_normal.value
+    assert abs(found.spectrum.high - rho) <= found.vectors.error_high
+    turned = Linear([1.0, 1.0, 3.0, 3.0], skew=2.0)
+    X = np.random.default_rng(1).normal(size=(6, 4))
+    assert vf.advise_vectors(X, [turned(x) for x in X], tied=True).vectors.error_high is not None
 
 
 def test_noise_of_the_solvers_is_measured_and_what_it_drowns_is_left_out():
