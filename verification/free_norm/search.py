@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -247,19 +248,22 @@ def drawn_in(
 
 def least_ratio(over: tuple[Any, Any, Any], under: tuple[Any, Any, Any]) -> Floats:
     """The least ratio of two quadratic polynomials in Bernstein's form (ends, middle) on [0, 1], the second one > 0."""
-    (f, g, m), (p, q, r) = over, under
-    a, b, c = g * r - m * q, g * p - f * q, m * p - f * r  # of its derivative, in t = u/(1 - u)
     with np.errstate(all="ignore"):
+        (f, g, m), (p, q, r) = over, under
+        best = np.asarray(np.minimum(np.where(p > 0, f / p, np.where(f < 0, -np.inf, np.inf)), g / q))
+        inner = ~((r > 0) & (m / r >= best))  # elsewhere an end is the least: the ratio is a mean of the three
+        f, g, m, p, q, r = (np.broadcast_to(each, best.shape)[inner] for each in (f, g, m, p, q, r))
+        a, b, c = g * r - m * q, g * p - f * q, m * p - f * r  # of its derivative, in t = u/(1 - u)
         half = -(b + np.copysign(np.sqrt(np.maximum(b**2 - 4 * a * c, 0)), b)) / 2
-        best = np.minimum(np.where(p > 0, f / p, np.where(f < 0, -np.inf, np.inf)), g / q)
         for t in (half / a, c / half):
             value = (f + 2 * m * t + g * t**2) / (p + 2 * r * t + q * t**2)
-            best = np.where((t > 0) & np.isfinite(value), np.minimum(best, value), best)
-    return np.asarray(best)
+            best[inner] = np.where((t > 0) & np.isfinite(value), np.minimum(best[inner], value), best[inner])
+    return best
 
 
 def _least(missing: Callable[[float], float], low: float, high: float) -> float | None:
     """The least value from which on something that grows is >= 0, on the safe side; None where it is nowhere."""
+    missing = cache(missing)  # the search for a zero begins and ends where it was asked already
     if missing(high) < 0:
         return None
     if missing(low) >= 0:
