@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -58,7 +57,7 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     floats = start.astype(float), end.astype(float)
     if not rounding:
-        start, end = whole_numbers(points)[0][edges.T]
+        start, end = whole_numbers(points[edges.T])[0]
     if _convex(edges, (start, end), floats):
         return None
     for i, j in _near(*floats):
@@ -81,9 +80,9 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
 
 def whole_numbers(values: NDArray[Any]) -> tuple[NDArray[Any], int]:
     """Rationals as multiples of 1/unit, and that unit: whole numbers are faster than fractions."""
-    exact = [Fraction(x) for x in values.ravel().tolist()]
-    unit = math.lcm(*(x.denominator for x in exact))
-    whole = np.array([x.numerator * (unit // x.denominator) for x in exact], dtype=object)
+    exact = [x.as_integer_ratio() for x in values.ravel().tolist()]
+    unit = math.lcm(*(denominator for _, denominator in exact))
+    whole = np.array([numerator * (unit // denominator) for numerator, denominator in exact], dtype=object)
     return whole.reshape(values.shape), unit
 
 

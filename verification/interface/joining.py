@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d import Line, Mesh, MeshError, Supports, facing, mortar, surface, trapezoid
-from fem1d2d.mesh import Floats, Ints, place_of
+from fem1d2d.mesh import Floats, Ints, place_of, undirected
 from fem1d2d.trace import SAME, extent
 from verification.interface.interface import Grid, Interface, Law, Support
 from verification.problem.specification import Problem
@@ -349,9 +349,9 @@ def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints],
         x = mesh.points[own, 0].astype(float)
         off = SAME * extent(mesh)
         fits[i] = bool(len(x) > 1 and abs(x[0] - ends[0]) <= off and abs(x[-1] - ends[1]) <= off)
-        edges = set(map(frozenset, mesh.boundary.tolist()))
-        holes = [j for j in range(len(own) - 1) if frozenset(own[j : j + 2].tolist()) not in edges]
-        if holes:
+        between, of = np.column_stack([own[:-1], own[1:]]), len(mesh.points)
+        holes = np.flatnonzero(~np.isin(undirected(between, of), undirected(mesh.boundary, of)))
+        if len(holes):
             where = f"between x = {x[holes[0]]:g} and {x[holes[0] + 1]:g}"
             needed = f"body {i + 1} has no surface {where}: needed a Gamma_c of one piece"
             raise problem.refuse("contact.interval", given, needed)
