@@ -137,8 +137,11 @@ class MatrixBlock:
 
     def __init__(self, program: Program, block: slice, left: Floats, right: Floats) -> None:
         self.block, self.fixed, self.free = block, program.fixed[block, block][None], program.free[block, block]
-        self.left, self.right = left, right = left[:, block], right[:, block]
-        self.rows, self.tie = len(self.free), program.tie
+        left, right, self.tie = left[:, block], right[:, block], program.tie
+        if self.tie is not None:  # most rows of a program of many blocks are 0 in this one
+            own = left.any(axis=1) & right.any(axis=1)
+            left, right, self.tie = left[own], right[own], self.tie[own]
+        self.left, self.right, self.rows = left, right, len(self.free)
         both = np.vstack([left, right])
         place: dict[bytes, int] = {}  # zeta and the slip are in several products
         at = [place.setdefault(row.tobytes(), len(place)) for row in np.round(both, ALIKE) + 0.0]  # no -0
