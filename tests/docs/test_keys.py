@@ -152,7 +152,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small(folder: Path) -> vf.Problem:
-    problem = vf.example("section6").changed(cells=((10, 2), (6, 2)))
+    problem = vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.1")  # as other tests in the continuum
     (folder / "small.toml").write_text(problem.to_toml(), "utf-8")
     (folder / "grid.toml").write_text('problem = "small.toml"\n[grid]\ntheta = [0.5]\n', "utf-8")
     return problem
