@@ -25,6 +25,28 @@ KEYBOARD = """
 })();
 """
 
+#: The comment in a source above a block that answers the question of the widget before it.
+WAITS = "waits"
+
+#: Such a block is shown when somebody has answered, or asks for it, and on paper.
+ANSWERS = """
+addEventListener("DOMContentLoaded", () => {
+  const widgets = [...document.querySelectorAll("[data-widget]")];
+  for (const block of document.querySelectorAll(".waits")) {
+    const above = (one) => one.compareDocumentPosition(block) & Node.DOCUMENT_POSITION_FOLLOWING;
+    const widget = widgets.filter(above).at(-1);
+    if (!widget || "answered" in widget.dataset) continue;
+    const button = document.createElement("button"), show = () => { button.remove(); block.hidden = false; };
+    Object.assign(button, { type: "button", className: "waiting", textContent: "Show the answer to the question" });
+    block.before(button);
+    block.hidden = true;
+    button.addEventListener("click", show);
+    widget.addEventListener("answered", show);
+    addEventListener("beforeprint", show);
+  }
+});
+"""
+
 #: Said where formulas stay as they are typed.
 TYPED = "<noscript><p>Formulas need JavaScript. Without it they are shown as they are typed in TeX.</p></noscript>"
 
@@ -36,6 +58,18 @@ def give_ids_once(app: Sphinx, doctree: nodes.document, page: str) -> None:
         if isinstance(node, nodes.container | nodes.section | nodes.admonition):
             node["ids"] = [name for name in node["ids"] if name not in seen]
         seen.update(node["ids"])
+
+
+def let_answers_wait(app: Sphinx, doctree: nodes.document, page: str) -> None:
+    """Give a class to the blocks that answer the question of a widget."""
+    for mark in doctree.findall(nodes.comment):
+        if mark.astext() == WAITS:
+            block = mark.next_node(nodes.Element, descend=False, siblings=True)
+            while isinstance(block, nodes.comment):
+                block = block.next_node(nodes.Element, descend=False, siblings=True)
+            if block is None:
+                raise ValueError(f"{page}: the comment {WAITS!r} needs a block below it")
+            block["classes"].append(WAITS)
 
 
 def description(doctree: nodes.document) -> str:
@@ -72,5 +106,7 @@ def describe(app: Sphinx, page: str, template: str, context: dict[str, Any], doc
 def connect(app: Sphinx) -> None:
     """Events of all pages."""
     app.connect("doctree-resolved", give_ids_once)
+    app.connect("doctree-resolved", let_answers_wait)
     app.connect("html-page-context", describe, priority=900)  # after the theme
     app.add_js_file(None, body=KEYBOARD)
+    app.add_js_file(None, body=ANSWERS)

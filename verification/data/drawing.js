@@ -209,11 +209,14 @@ window.nd = (() => {
     const ask = html("fieldset", { class: "ask" }, html("legend", {}, `Predict first. ${question}`));
     const outcome = [widget.controls, widget.says, html("details", {}, html("summary", {}, "The numbers of this picture"), widget.table),
       html("p", { class: "link" }, widget.link, " \u00b7 ", saving(figure, name))];
+    const answered = () => { figure.dataset.answered = ""; figure.dispatchEvent(new CustomEvent("answered")); };
+    if (given) answered();
     const open = (words) => {
       told.textContent = words; told.hidden = false; widget.revealed = true; ask.hidden = true;
       for (const part of outcome) part.hidden = false;
       show(); widget.update();
       widget.answered = true;
+      answered();
       told.focus({ preventScroll: true }); // the button that had it is gone
     };
     const verdict = (answer) => (right === null ? `You said: ${answer}.` : answer === right ? "Right:" : `Not quite: ${wrong[answer]}`);
