@@ -8,8 +8,11 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from multiprocessing.connection import Connection
 from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # each command starts with this module
+    from multiprocessing.connection import Connection
 
 #: The reason for a part that is missing after Ctrl-C.
 INTERRUPTED = "interrupted before it was worked out"
