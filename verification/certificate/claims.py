@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
@@ -80,16 +81,24 @@ class Claims:
 
         ``norm`` is the one of the claim, as :func:`written_norm` has it; (5.21) by default.
         """
+        return self.first_accepted([(theta, factor, multipliers)], norm)
+
+    def first_accepted(
+        self, wanted: Sequence[tuple[Fraction, Fraction, dict[str, Any]]], norm: dict[str, Any] | None = None
+    ) -> dict[str, Any] | None:
+        """The first claim of several, each of theta, factor and multipliers, that is accepted; None where none is.
+
+        All are tried before more bits are, as these need another elimination.
+        """
         for bits in sorted({self.bits, _allowed(1.5 * self.bits)}):
-            claim = {"theta": str(theta), "factor": str(factor), "bits": bits, "multipliers": multipliers}
-            claim |= {} if norm is None else {"norm": norm}
-            words = f"checking theta = {float(theta):.6g}, factor {float(factor):.10g} in balls of {bits} bits"
-            self.progress(words, None)
-            try:
-                check(self.discrete, claim, lambda body, both, bits=bits: self._eliminated(body, both, bits))
-            except (ValueError, ZeroDivisionError):
-                continue
-            return claim
+            for theta, factor, multipliers in wanted:
+                claim = {"theta": str(theta), "factor": str(factor), "bits": bits, "multipliers": multipliers}
+                claim |= {} if norm is None else {"norm": norm}
+                words = f"checking theta = {float(theta):.6g}, factor {float(factor):.10g} in balls of {bits} bits"
+                self.progress(words, None)
+                with suppress(ValueError, ZeroDivisionError):
+                    check(self.discrete, claim, lambda body, both, bits=bits: self._eliminated(body, both, bits))
+                    return claim
         return None
 
     @cached_property
@@ -131,8 +140,8 @@ class Claims:
         self, theta: Fraction, spare: float, multipliers: dict[str, Any], norm: dict[str, Any] | None = None
     ) -> dict[str, Any] | None:
         """A claim that is accepted, its factor below 1 by nearly ``spare``; None where none is."""
-        wanted = (1 - _decimal(spare * (1 - margin), ROUND_DOWN) for margin in MARGINS)
-        return next(filter(None, (self.accepted(theta, factor, multipliers, norm) for factor in wanted)), None)
+        factors = [1 - _decimal(spare * (1 - margin), ROUND_DOWN) for margin in MARGINS]
+        return self.first_accepted([(theta, factor, multipliers) for factor in factors], norm)
 
 
 class Confirmation:
@@ -195,10 +204,10 @@ class Confirmation:
         grows as theta falls, so that one certificate answers for all smaller ones.  NoCertificate where none is
         accepted.
         """
-        for share in LESS:
-            found = _decimal(theta * (1 - share), ROUND_DOWN)
-            if self._claims.accepted(found, Fraction(1), written(times(float(found), multipliers))):
-                return found
+        thetas = [_decimal(theta * (1 - share), ROUND_DOWN) for share in LESS]
+        wanted = [(each, Fraction(1), written(times(float(each), multipliers))) for each in thetas]
+        if claim := self._claims.first_accepted(wanted):
+            return Fraction(claim["theta"])
         raise NoCertificate(f"theta = {theta:.6g} in doubles {NOT_BELOW}")
 
     def friction_threshold(self, k: float, propose: Callable[[float], Weights]) -> Fraction:
