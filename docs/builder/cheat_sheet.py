@@ -35,6 +35,11 @@ class Part(NamedTuple):
     lines: Sequence[Line]
 
 
+def _limit(theta: float) -> str:
+    """The end of an interval of theta, which is cut off at 1."""
+    return f"{theta:.2f}{' (theta is at most 1)' * (theta > 1)}"
+
+
 @cache
 def parts() -> list[Part]:
     """All of the sheet; the values are those of Section 6, from the library's own functions."""
@@ -42,6 +47,7 @@ def parts() -> list[Part]:
     k = float(problem.contact.friction)
     rho, rho_min = measured.rho_max.value, measured.rho_min.value
     kappas = tuple(k * measured.C_s_energy.value * C_t.value for C_t in (measured.C_t1, measured.C_t2))
+    rho_N = vf.measure(problem.changed(friction=0)).rho_normal.value
     rate = energy_norms.predicted_rate(rho)
     high, low = (
         energy_norms.tied_factor(theta, *ends) for theta, ends in ((LARGE, (rho, rho)), (SMALL, (rho_min, rho_min)))
@@ -60,23 +66,31 @@ def parts() -> list[Part]:
                     r"\rho = \max_v \frac{v^\top S_c v}{v^\top S_n v}",
                     f"{rho:.3f}",
                 ),
-                Line("the same with the roles exchanged", r"1/\rho_{\min}", f"{1 / rho_min:.1f}"),
+                Line(
+                    "the same without tangential forces: it takes the place of rho if there is no friction",
+                    r"\rho_N \leq \rho",
+                    f"{rho_N:.3f}",
+                ),
+                Line("rho with the roles exchanged", r"1/\rho_{\min}", f"{1 / rho_min:.1f}"),
             ],
         ),
         Part(
             "Which theta?",
-            "Without friction, or with tied bodies, these are proved; with friction they are predictions.",
+            "Proved without friction (with rho_N) and for tied bodies (with rho); predicted with friction (with rho).",
             [
-                Line("the iteration converges below", r"2/(1 + \rho)", f"{2 / (1 + rho):.2f} (theta is at most 1)"),
-                Line("best theta where nodes may open", r"2/(2 + \rho)", f"{energy_norms.predicted_theta(rho):.3f}"),
-                Line("its factor per step", r"\rho/(2 + \rho)", f"{rate:.3f}"),
+                Line("no friction: the iteration converges below", r"2/(1 + \rho_N)", _limit(2 / (1 + rho_N))),
+                Line("its best theta", r"2/(2 + \rho_N)", f"{energy_norms.predicted_theta(rho_N):.3f}"),
+                Line("its factor per step", r"\rho_N/(2 + \rho_N)", f"{energy_norms.predicted_rate(rho_N):.3f}"),
+                Line("friction: the predicted best theta", r"2/(2 + \rho)", f"{energy_norms.predicted_theta(rho):.3f}"),
+                Line("the predicted factor per step", r"\rho/(2 + \rho)", f"{rate:.3f}"),
+                Line("tied bodies: the iteration converges below", r"2/(1 + \rho)", _limit(2 / (1 + rho))),
                 Line(
-                    "best theta if nothing opens or slips",
+                    "their best theta (with friction: predicted if nothing opens or slips)",
                     r"2/(2 + \rho_{\min} + \rho)",
                     f"{energy_norms.tied_theta(rho_min, rho):.3f}",
                 ),
                 Line(
-                    "its factor per step",
+                    "their factor per step",
                     r"(\rho - \rho_{\min})/(2 + \rho_{\min} + \rho)",
                     f"{energy_norms.tied_rate(rho_min, rho):.3f}",
                 ),
@@ -85,7 +99,8 @@ def parts() -> list[Part]:
         ),
         Part(
             "What does one run say?",
-            "At a fixed theta the residual changes by the ratio r in each step, steadily; without friction or tied.",
+            "At a fixed theta the residual changes by the ratio r in each step, steadily. With open nodes r may be "
+            "1 - theta, and then nothing follows.",
             [
                 Line(
                     "factor of a mode with ratio lambda",
@@ -93,12 +108,12 @@ def parts() -> list[Part]:
                     f"theta = {LARGE}, lambda = {rho:.3f}: {1 - LARGE * (1 + rho):.3f}",
                 ),
                 Line(
-                    "the residual changes its sign",
+                    "no friction, or tied bodies: the residual changes its sign",
                     r"\rho \geq (1 + r)/\theta - 1",
                     f"theta = {LARGE}, r = {high:.3f}: {(1 + high) / LARGE - 1:.3f}",
                 ),
                 Line(
-                    "the residual keeps its sign",
+                    "tied bodies only: the residual keeps its sign",
                     r"\rho_{\min} \leq (1 - r)/\theta - 1",
                     f"theta = {SMALL}, r = {low:.3f}: {(1 - low) / SMALL - 1:.3f}",
                 ),
@@ -159,11 +174,11 @@ def drawn() -> Figure:
         write(0.07, y - 0.024, words, fontsize=9)
         y -= 0.054 + 0.013 * words.count("\n")
         for line in part.lines:
-            question, formula = line.question, line.formula.replace(r"^\top", "^T")
-            write(0.09, y, fill(question, 50), fontsize=9)
+            question, formula = fill(line.question, 50), line.formula.replace(r"^\top", "^T")
+            write(0.09, y, question, fontsize=9)
             write(0.47, y, f"${formula}$", fontsize=11)
             write(0.70, y, line.example, fontsize=9)
-            y -= 0.038
+            y -= 0.027 + 0.009 * question.count("\n")
         y -= 0.018
     write(0.07, y, "Example: the plates of Section 6, Neumann problem on the lower one, k = 0.2.", fontsize=8)
     return figure

@@ -6,12 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import verification as vf
 from ndtheory import energy_norms
 
 #: Formulas of the sheet that stand in the library, too, and the unknowns they have there.
 FORMULAS = {
-    "best theta where nodes may open": (energy_norms.predicted_theta, ("rho",)),
-    "best theta if nothing opens or slips": (energy_norms.tied_theta, ("low", "rho")),
+    "its best theta": (energy_norms.predicted_theta, ("normal",)),
+    "its factor per step": (energy_norms.predicted_rate, ("normal",)),
+    "friction: the predicted best theta": (energy_norms.predicted_theta, ("rho",)),
+    "their best theta (with friction: predicted if nothing opens or slips)": (energy_norms.tied_theta, ("low", "rho")),
     "every small theta contracts if": (energy_norms.friction_number, ("kappa_1", "kappa_2")),
 }
 
@@ -23,12 +26,20 @@ def lines(builder):
 
 def python(formula):
     """A formula of the sheet as an expression of Python."""
-    text = formula.removesuffix(" < 1").replace(r"\rho_{\min}", "low").replace("^2", "**2").replace("\\", "")
+    text = (
+        formula.removesuffix(" < 1")
+        .replace(r"\rho_N", "normal")
+        .replace(r"\rho_{\min}", "low")
+        .replace("^2", "**2")
+        .replace("\\", "")
+    )
     assert re.fullmatch(r"[\w\s()+*/.-]+", text), formula
     return compile(text, formula, "eval")
 
 
-@given(value=st.fixed_dictionaries({name: st.floats(1e-3, 1e3) for name in ("rho", "low", "kappa_1", "kappa_2")}))
+@given(
+    value=st.fixed_dictionaries({name: st.floats(1e-3, 1e3) for name in ("rho", "normal", "low", "kappa_1", "kappa_2")})
+)
 @pytest.mark.parametrize("question", FORMULAS)
 def test_a_formula_of_the_sheet_is_that_of_the_library(lines, question, value):
     function, names = FORMULAS[question]
@@ -38,10 +49,20 @@ def test_a_formula_of_the_sheet_is_that_of_the_library(lines, question, value):
 
 def test_the_examples_of_a_run_give_back_the_ratios_of_the_bodies(lines):
     rho = lines["stiffness of the contact body over that of the Neumann body on the interface, at most"].example
-    assert lines["the residual changes its sign"].example.endswith(f": {rho}")
-    exchanged = float(lines["the same with the roles exchanged"].example)
-    kept = float(lines["the residual keeps its sign"].example.rpartition(" ")[2])
+    assert lines["no friction, or tied bodies: the residual changes its sign"].example.endswith(f": {rho}")
+    exchanged = float(lines["rho with the roles exchanged"].example)
+    kept = float(lines["tied bodies only: the residual keeps its sign"].example.rpartition(" ")[2])
     assert 1 / kept == pytest.approx(exchanged, rel=0.02)
+
+
+def test_what_is_proved_without_friction_is_what_advise_finds_there(lines):
+    """The largest ratio of all displacements, tangential ones included, belongs to tied bodies and to predictions."""
+    role = vf.advise(vf.example("section6").changed(friction=0)).best
+    assert lines["its best theta"].example == f"{role.theta_proved:.3f}"
+    assert lines["its factor per step"].example == f"{role.factor_proved.value:.3f}"
+    predicted = vf.advise(vf.example("section6")).best
+    assert lines["friction: the predicted best theta"].example == f"{predicted.theta_predicted:.3f}"
+    assert role.theta_proved > predicted.theta_predicted
 
 
 def test_a_column_of_the_pdf_ends_before_the_next_one(builder):
