@@ -4,7 +4,7 @@ Vectors of Kratos
 
 Kratos can write the forces before and after each step as VTK files, in single precision. Six pairs are
 enough for ``vf.advise_vectors``. Here the plates stand in for Kratos and are rounded like its files. The
-theta found is close to 2/(2 + rho) with the rho of the matrices, the best one, the dotted line.
+theta found is close to 2/(2 + rho_N) from the matrices, the dotted line.
 """
 
 from itertools import islice
@@ -27,7 +27,7 @@ figure = Figure(layout="constrained")
 ax = figure.subplots()
 ax.plot(thetas, [vf.run(plates, theta=f"{theta:.3f}").iterations for theta in thetas], "o-", label="steps of a run")
 ax.axvline(advice.theta, color="C1", label="theta from the vectors")
-ax.axvline(best, linestyle=":", color="0.3", label="2/(2 + rho)")
+ax.axvline(best, linestyle=":", color="0.3", label="2/(2 + rho_N)")
 ax.set(xlabel="relaxation factor theta", ylabel="steps to 1e-9", ylim=(0, None))
 ax.legend()
 figure.savefig("kratos_vectors.png")

@@ -3,8 +3,8 @@ What changes on finer meshes?
 =============================
 
 ``vf.measure(problem, refine=2)`` measures the constants on three meshes. The ratio of stiffnesses
-rho, which decides on theta, grows on finer meshes: it is a largest value over all displacements
-of the mesh, and a finer mesh has more of them.
+rho, which decides on theta, grows here. It is a largest value over all displacements of the mesh, and a
+finer mesh has more of them; but the stiffness of each falls, so on other bodies rho may fall too.
 """
 
 from matplotlib.figure import Figure

@@ -3,7 +3,7 @@ Steps promised, steps taken
 ===========================
 
 Without friction a theorem bounds the factor of each step, for all forces. It promises steps for the
-worst of them, and none of these runs, with one load each, takes more. The promise is best at theta = 2/(2 + rho),
+worst of them, and none of these runs, with one load each, takes more. The promise is best at theta = 2/(2 + rho_N),
 the dotted line.
 """
 

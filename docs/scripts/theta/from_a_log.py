@@ -3,8 +3,8 @@ Theta from a convergence log
 ============================
 
 Any code writes the residual of each step. From the log and its theta ``vf.advise_logs`` finds the
-eigenvalue behind the rate, and the next theta to use. The log here falls by 0.8
-at theta = 0.45, so the largest ratio of stiffnesses is (1 + 0.8)/0.45 - 1 = 3.
+eigenvalue behind the rate, and the next theta to use. The log here falls by 0.8 at theta = 0.45.
+Without friction rho is at least (1 + 0.8)/0.45 - 1 = 3, and about that if all nodes stay closed.
 """
 
 import tempfile

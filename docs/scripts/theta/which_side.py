@@ -4,7 +4,7 @@ Which body gets the forces?
 
 One body is loaded with the forces, the other one is pushed against its shape. ``vf.advise`` measures
 both assignments. Given to the stiffer lower plate, the forces settle in far fewer
-steps than given to the softer upper one, each at its best theta.
+steps than given to the softer upper one, each at the theta predicted as its best.
 """
 
 from matplotlib.figure import Figure
