@@ -13,9 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import verification as vf
 from ndtheory import energy_norms
 from ndtheory.moduli import Moduli, half_planes
+from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.rates import StepRatio
 from verification.bounds.verdicts import judge
 
@@ -23,7 +26,7 @@ RECORD = Path(__file__).resolve().parents[2] / "verification" / "data" / "exerci
 
 Numbers = Sequence[Any]
 
-#: Mistakes in an answer that any exercise may have.
+#: Mistakes in an answer that any exercise may have whose answer is neither a verdict nor a number of steps.
 ANSWER: dict[str, Callable[[float], float]] = {
     "Is the quotient upside down?": lambda x: 1 / x,
     "Did you exchange theta and 1 - theta?": lambda x: 1 - x,
@@ -56,7 +59,7 @@ class Exercise:
         """What each mistake leads to."""
         for hint, mistake in self.mistakes.items():
             yield hint, list(mistake(*numbers))
-        for hint, change in ANSWER.items() if all(isinstance(x, int | float) for x in right) else ():
+        for hint, change in ANSWER.items() if all(isinstance(x, float) for x in right) else ():
             with suppress(ArithmeticError):
                 yield hint, [change(x) for x in right]
 
@@ -82,9 +85,14 @@ def bonded(**changes: Any) -> tuple[float, float]:
     return found.rho_min.value, found.rho_max.value
 
 
+def decay(rho: float) -> float:
+    """Steps to 1e-9 that the best theta promises, in fractions of a step."""
+    return math.log(1e-9) / math.log(energy_norms.predicted_rate(rho))
+
+
 def steps(rho: float) -> int:
     """Steps to 1e-9 that the best theta promises."""
-    return math.ceil(math.log(1e-9) / math.log(energy_norms.predicted_rate(rho)))
+    return math.ceil(decay(rho))
 
 
 def thetas(rho: float) -> Numbers:
@@ -128,6 +136,32 @@ def ends_of(t1: float, q1: float, t2: float, q2: float, less: float = 1) -> Numb
     return low - less, high - less, 2 / (low + high)
 
 
+def half_way() -> tuple[float, int, int]:
+    """The rate that the run of the page forecasts, the step at which it does, and the step of its end."""
+    forecast = pressed().linearise().forecast
+    assert forecast is not None
+    return forecast.rate, forecast.made_at_iteration, forecast.iterations
+
+
+def pressed() -> vf.Run:
+    """The run of the page on predictions."""
+    return vf.run(vf.example("section6").changed(cells=((20, 4), (12, 4)), theta="0.5"))
+
+
+def spectrum_of_step() -> tuple[float, float, float]:
+    """rho of these plates, and the ends of the spectrum of T' at their solution, which is real."""
+    run = pressed()
+    piece = piece_of(run.pair, run.last.g, run.last.contact.pattern)
+    values = np.sort(np.linalg.eigvals(piece.jacobian).real)
+    return vf.measure(run.pair).rho_max.value, float(values[0]), float(values[-1])
+
+
+def all_thetas(rho: float, low: float, high: float) -> Numbers:
+    """The least ``max |1 - theta + theta mu|``, its theta, and 2/(2 + rho)."""
+    theta = 2 / (2 - low - high)
+    return 1 - theta + theta * high, theta, 2 / (2 + rho)
+
+
 EXERCISES = {
     "two_bars.1": Exercise(
         "both ends of the interval of g", lambda rho: (0.1, 0.1 * (1 + 1 / rho)),
@@ -137,7 +171,8 @@ EXERCISES = {
     ),
     "two_bars.2": Exercise(
         "rho, 1/(1+rho), 2/(2+rho) and the limit of theta", thetas, lambda: measured("two-bars", "rho_max", 1),
-        {OTHER_BODY: lambda rho: thetas(1 / rho), OPEN: lambda rho: (rho, 1 / rho, 1 / (1 + rho), 2 / rho)},
+        {OTHER_BODY: lambda rho: thetas(1 / rho), OPEN: lambda rho: (rho, 1 / rho, 1 / (1 + rho), 2 / rho),
+         "Does a theta above 1 converge too? The limit may exceed 1.": lambda rho: (*thetas(rho)[:3], 1)},
     ),
     "two_bars.3": Exercise(
         "m for E = L = 1", lambda t: [1 / (1 + 1 / t**2)], lambda: [math.pi / 2],
@@ -194,7 +229,9 @@ EXERCISES = {
         lambda: measured("section6", "rho_normal", 1, 2, cells=((20, 3), (12, 3)), friction=0),
         {OTHER_BODY: lambda *rho: [steps(x) for x in reversed(rho)],
          "Is this 1/(1 + rho)? The promise is made for 2/(2 + rho).":
-         lambda *rho: [math.ceil(math.log(1e-9) / math.log(x / (1 + x))) for x in rho]},
+         lambda *rho: [math.ceil(math.log(1e-9) / math.log(x / (1 + x))) for x in rho],
+         "Is it rounded up? A step is taken as a whole.": lambda *rho: [*map(decay, rho)],
+         "Is it rounded down? The last step has to be taken too.": lambda *rho: [int(decay(x)) for x in rho]},
     ),
     "constants.1": Exercise(
         "the length", lambda full: [full / 2], lambda: [math.pi],
@@ -225,14 +262,44 @@ EXERCISES = {
          "This is k_e, below which there is one solution.": lambda slip: [
              energy_norms.friction_limit(1.0, math.sqrt(2), 1.0)]},
     ),
+    "friction.3": Exercise(
+        "k_s with the roles of the model, and with the roles exchanged",
+        lambda *found: [each.friction_threshold.value for each in found],
+        lambda: [vf.measure(vf.example("section6").changed(neumann_body=body)) for body in (1, 2)],
+        {"This is k_e, below which some theta contracts. Where does every small theta?": lambda *found:
+         [each.friction_limit.value for each in found],
+         OTHER_BODY: lambda *found: [each.friction_threshold.value for each in reversed(found)]},
+    ),
     "theorem_and_experiment.2": Exercise(
         "the three verdicts", lambda *ratios: verdicts(0.01, *ratios), lambda: (0.52, 0.48, 0.501),
-        {"Does the ratio exceed the bound by more than its own error?": lambda *ratios: verdicts(0, *ratios)},
+        {"Does the ratio exceed the bound by more than its own error?": lambda *ratios: verdicts(0, *ratios),
+         "Is the error of a ratio as large as its distance from the bound?": lambda *ratios: verdicts(0.03, *ratios),
+         "Which of the two refutes a bound, a ratio above it or one below it?":
+         lambda *ratios: verdicts(0.01, *(1 - x for x in ratios)),
+         "Can a ratio be said to be below the bound if the bound lies within its error?":
+         lambda *ratios: [*verdicts(0.01, *ratios[:2]), "CONSISTENT"],
+         "The bound applies to each run. What does the comparison with its ratio say?":
+         lambda *ratios: ["HYPOTHESES_NOT_MET"] * len(ratios)},
     ),
     "theorem_and_experiment.3": Exercise(
         "theta at k_e", lambda rho, a: [(2 - a * math.sqrt(rho)) / (2 + rho - a * math.sqrt(rho))], last_theta,
         {"Did you forget the root of rho?": lambda rho, a: [(2 - a * rho) / (2 + rho - a * rho)],
          "This is the best theta without friction.": lambda rho, a: [2 / (2 + rho)]},
+    ),
+    "prediction.1": Exercise(
+        "the number of further steps, and the step at which the run ends",
+        lambda rate, made, end: (math.ceil(-4.5 / math.log10(rate)), end), half_way,
+        {"Does the residual still have to fall by nine decades? It has fallen by half of them.": lambda rate, made, end:
+         (math.ceil(-9 / math.log10(rate)), made + math.ceil(-9 / math.log10(rate))),
+         "Are these counted from the start? The run is at the step of the forecast.": lambda rate, made, end:
+         (end, made + end)},
+    ),
+    "prediction.3": Exercise(
+        "the least rho(J), its theta, and 2/(2+rho)", all_thetas, spectrum_of_step,
+        {"Is the sign of an eigenvalue of T' lost?":
+         lambda rho, low, high: (max(abs(low), abs(high)), 1.0, 2 / (2 + rho)),
+         "Is this the spectrum of T'? That of J is 1 - theta + theta mu.": lambda rho, low, high:
+         (high, *all_thetas(rho, low, high)[1:])},
     ),
     "other_code.1": Exercise(
         "the smallest and the largest eigenvalue, and the best theta", ends_of, lambda: (0.1, 0.85, 0.22, 0.76),

@@ -5,15 +5,19 @@ Run on a built site: ``python tests/docs/test_site.py docs/_build/html`` prints 
 
 import ast
 import importlib
+import json
 import os
 import re
 import sys
 from html import unescape
 from html.parser import HTMLParser
+from importlib.resources import files
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+
+import verification as vf
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -132,6 +136,47 @@ def foreign_sources(html_dir: Path) -> list[str]:
     return [
         f"_modules/{path}: not our code" for path in pages if path.with_suffix("").parts[0] not in (*NAMED, "index")
     ]
+
+
+#: The answer to an exercise that can be checked: the name of the exercise, and the solution.
+SOLUTION = re.compile(
+    r"vf\.check\(&quot;([\w.]+)&quot;(?:(?!</details>).)*?<summary.*?</summary>(.*?)</details>", re.DOTALL
+)
+
+
+def printed_answers(text: str) -> list[str]:
+    """The numbers, fractions and verdicts that a solution of a built page prints."""
+    text = unescape(re.sub(r"<[^>]*>", "", text)).replace("\N{MINUS SIGN}", "-")
+    return re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?(?:/\d+)?|\b[A-Z]{4,}\b", text)
+
+
+def refused_solutions(html_dir: Path) -> list[str]:
+    """Lines ``file: exercise`` for each part of an answer that ``vf.check`` takes from no number of the solution."""
+    known = json.loads((files("verification") / "data" / "exercises.json").read_text("utf-8"))
+    found = []
+    for path in sorted(html_dir.rglob("*.html")):
+        for name, solution in SOLUTION.findall(path.read_text(encoding="utf-8")):
+            right, shown = known[name]["right"], printed_answers(solution)
+            for n in range(len(right)):
+                asked = (vf.check(name, [*right[:n], each, *right[n + 1 :]]) for each in shown)
+                if "right" not in asked:
+                    found.append(f"{path.relative_to(html_dir)}: {name}, number {n + 1}: {right[n]} is not printed")
+    return found
+
+
+@pytest.mark.parametrize(
+    ("solution", "count"),
+    [
+        ("<p>\\(\\rho\\) is 1.33 and 3.87, equal at <span>0.586</span>.</p>", 0),
+        ("<p>equal at <span>0.59</span>.</p>", 1),
+        ("<p>It is the root of a quotient.</p>", 1),
+    ],
+)
+def test_a_printed_solution_that_is_not_right_is_found(tmp_path, solution, count):
+    page = f"""<p><code>vf.check(&quot;which_side.1&quot;, ..)</code></p>
+<details><summary>Solution 0.586</summary>{solution}</details>0.586"""
+    (tmp_path / "page.html").write_text(page, encoding="utf-8")
+    assert len(refused_solutions(tmp_path)) == count
 
 
 @pytest.mark.parametrize(

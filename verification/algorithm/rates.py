@@ -77,6 +77,9 @@ class ObservedRate:
     begin: int
     end: int
 
+    def __str__(self) -> str:
+        return f"{self.value:.3g} (iterations {self.begin} to {self.end})"
+
 
 def observed_rate(pair: ContactPair, iterates: Sequence[Iterate]) -> ObservedRate | None:
     """Return the rate that a run shows at its end, or None where fewer than two step ratios are clear of the noise.

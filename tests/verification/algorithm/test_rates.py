@@ -153,6 +153,7 @@ def test_two_step_ratios_are_the_least_that_show_a_rate():
     found = observed_rate(PAIR, states([1.0, 0.5, 0.125], [1e-15] * 3))
     assert found.value == pytest.approx(np.sqrt(0.125), rel=1e-12)
     assert (found.begin, found.end) == (0, 2)
+    assert str(found) == "0.354 (iterations 0 to 2)"
     assert observed_rate(PAIR, states([1.0, 0.5, 1e-20], [1e-15] * 3)) is None  # the third is noise
 
 
