@@ -63,7 +63,7 @@ def check(exercise: str, answer: Any) -> str:
 
 def _same(part: Any, of: Any) -> bool:
     if isinstance(of, str):
-        return str(part).strip().lower() == of.lower()
+        return str(part).strip().upper() == of
     try:
         return math.isclose(exact(part), of, rel_tol=THREE_DIGITS)
     except ValueError as error:

@@ -59,9 +59,6 @@ class Registry(MutableMapping[str, V]):
     def __iter__(self) -> Iterator[str]:
         return iter(self._filled())
 
-    def __reversed__(self) -> Iterator[str]:
-        return reversed(self._filled())
-
     def __len__(self) -> int:
         return len(self._filled())
 

@@ -52,7 +52,7 @@ class MethodRow(Part):
     )
     bound: str | None = key(
         "`at most` of a constant theta where only the largest eigenvalue is known: then `steps` suffice for "
-        "eigenvalues from 0 to it and any first error; `at least` where rho is bounded from below only",
+        "eigenvalues from 0 to it and any first error; `at least` of a prediction for the least rho of a run's bound",
         null="of a prediction",
         why="a prediction, no bound",
         default=None,

@@ -233,7 +233,7 @@ def which_method(found: Advice, names: Mapping[int | None, str] | None = None) -
         rows.append((roles, figures(own[0].theta), *(count(row.steps, SIGNS[row.bound]) for row in own)))
     first, *others = (METHOD_NAMES[row.method] for row in own)
     heads = ("Neumann" if named else "roles", "theta", f"steps to 1e-6: {first}", *others)
-    said = []
+    said = ["From g = 0 until |Tg - g| < 1e-6 |Tg|, with equal first errors of all modes."]
     if found.method is not None:
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
@@ -251,7 +251,7 @@ def which_method(found: Advice, names: Mapping[int | None, str] | None = None) -
 def few_methods(found: Advice) -> str:
     """The same in one line, where only the largest eigenvalue is known."""
     each = [f"{METHOD_NAMES[row.method]} {count(row.steps, SIGNS[row.bound])}" for row in found.methods]
-    return f"Steps to 1e-6: {', '.join(each)} (for eigenvalues from 0 to the largest)."
+    return f"Steps from g = 0 to |Tg - g| < 1e-6 |Tg|: {', '.join(each)} (for eigenvalues from 0 to the largest)."
 
 
 def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:

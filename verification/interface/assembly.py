@@ -195,10 +195,6 @@ class TwoBodies(Value):
         """The body whose traces reach the contact grid by the transfer; None where it is rigid."""
         return self.body2 if self.problem.contact_body == 1 else self.body1
 
-    def lines_on(self, body: Body) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """Yield the contact nodes of a body on each line of Gamma_c, their positions, and the ends of the line."""
-        return _lines_on(body.nodes, self.interface, own=body is not self.neumann)
-
     @property
     def elastic(self) -> list[Body]:
         """The bodies that are not rigid."""
@@ -578,7 +574,7 @@ def _load(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
         for side, force in spec.traction.items():
             facets = mesh.sides[prefix + side]
             loaded = facet_weights(mesh, facets)
-            for line, x, ends in _lines_on(nodes, interface, own=int(name[-1]) == problem.contact_body):
+            for line, x, ends in lines_on(nodes, interface, own=int(name[-1]) == problem.contact_body):
                 loaded -= _covered(mesh, facets, line, x if problem.named else None, ends)
             if any(force) and loaded.max() <= SAME * extent(mesh):
                 needed = "Gamma_c covers this side: a force there is lost; point_load gives one to its nodes"
@@ -596,8 +592,8 @@ def _load(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
     return load
 
 
-def _lines_on(nodes: Ints, interface: Interface, *, own: bool) -> Iterator[tuple[Ints, Floats, Floats]]:
-    """Yield the contact nodes of a body on each line, their positions, and the ends of the line.
+def lines_on(nodes: Ints, interface: Interface, *, own: bool) -> Iterator[tuple[Ints, Floats, Floats]]:
+    """Yield the contact nodes of a body on each line of Gamma_c, their positions, and the ends of the line.
 
     ``own`` is True for the body that carries the contact grid.
     """

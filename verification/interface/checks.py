@@ -13,7 +13,7 @@ from fem1d2d import Mesh, depths, facet_weights, largest_strains, rectangle, sur
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from ndtheory.keys import Part, key
-from verification.interface.assembly import TwoBodies
+from verification.interface.assembly import TwoBodies, lines_on
 from verification.interface.body import Body
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Grid
@@ -257,7 +257,8 @@ def _penetration(bodies: TwoBodies, moved: Displacements, beyond: Ints) -> tuple
     surfaces: list[list[_Surface]] = [[], []]
     for body, u in bodies.each(moved):
         i = int(body.name[-1]) - 1
-        lines = [(nodes, x if named else None, its) for nodes, x, its in bodies.lines_on(body)]
+        on = lines_on(body.nodes, bodies.interface, own=body is not bodies.neumann)
+        lines = [(nodes, x if named else None, its) for nodes, x, its in on]
         members = [body.mesh.surfaces[f"body{j}"] for j in problem.numbers(i + 1)] if problem.several else []
         each = [body.mesh.cells[cells] for cells in members] or [body.mesh.cells]
         surfaces[i] = [_Surface.of(body.mesh, u + i * lift, lines, cells) for cells in each]

@@ -12,7 +12,7 @@ from ndtheory import __version__
 from ndtheory.texts import printable
 from verification.comparison import Comparison
 from verification.sections.bounds import on_the_printed_proof
-from verification.show.parts import Table, shown
+from verification.show.parts import shown
 
 GLOSSARY = {
     "Neumann body": "The body that gets the linear problem of step I: the contact forces are a load on it. The other "
@@ -48,11 +48,6 @@ VERDICTS = {
 NARROW = 20
 
 
-def _wide(part: Table) -> bool:
-    """True if the columns of a table do not fit on a phone."""
-    return len(part.head) > 3 or any(len(str(cell)) > NARROW for row in part.rows for cell in row)
-
-
 class _Raised(str):
     """HTML of a text with its powers raised and the index of Gamma_c lowered, which jinja2 takes as it is."""
 
@@ -77,7 +72,7 @@ def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
     environment = Environment(
         loader=PackageLoader("verification", "data"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    environment.tests["wide"] = _wide
+    environment.tests["wide"] = lambda of: len(of.head) > 3 or any(len(str(x)) > NARROW for row in of.rows for x in row)
     environment.filters["raised"] = _Raised
     setting, *sections = shown(comparison.sections(), "report")
     return environment.get_template("report.html.j2").render(

@@ -91,7 +91,8 @@ def check_step(
     below = kit.examine("stays below its bound", cases, check.stays_below)
     converges = check.converges(kit)
     units = kit.examine("is independent of units", cases, check.is_independent_of_units)
-    ours, where = (check.is_ours, "with its loads") if loaded else (check.is_ours_far, "far from its loads")
+    at, where = (lambda force: force, "with its loads") if loaded else (check.far, "far from its loads")
+    ours = lambda force, other, share: check.is_ours(at(force))
     same = kit.examine("is the step of these matrices", cases, ours)
     return kit.report(below, converges, units, replace(same, detail=f"{same.detail}, {where}"))
 
@@ -196,11 +197,8 @@ class _Check:
         if not off <= self.tolerance:
             raise Fails(f"far from the loads T(4 g) differs from 4 T(g) by {off:.2g} of 4 g")
 
-    def is_ours(self, force: Floats, other: Floats, share: float) -> None:
+    def is_ours(self, force: Floats) -> None:
         expected = self.pair.interface.carry_back(self._own(force)[1].force)
         off, size = self.norm(self.image(force) - expected), self.norm(expected) + self.norm(force)
         if not off <= self.tolerance * size:
             raise Fails(f"T g differs from that of these matrices by {off / size:.2g} of the forces")
-
-    def is_ours_far(self, force: Floats, other: Floats, share: float) -> None:
-        self.is_ours(self.far(force), other, share)

@@ -181,7 +181,7 @@ def plane():
         Point(theta=0.1 * i, k=0.1, outcome=Outcome(outcome), iterations=9, coupled_residual=None)
         for i, outcome in enumerate(OUTCOMES, 1)
     ]
-    regions = {name: region(10.0**-i) for i, name in enumerate(reversed(BOUNDS))}
+    regions = {name: region(10.0**-i) for i, name in enumerate([*BOUNDS][::-1])}
     return Plane(
         title="all",
         regions=regions,
