@@ -98,7 +98,7 @@ def remedy_of(
     exchanged = _typed(other) if other > good else None
     if theta <= good and (outcome != "limit" or theta > good / 2):
         return Remedy(why=why, value=_typed(theta / 2), exchanged=exchanged, constant=constant)
-    formula = f" (2/(2 + rho), rho = {rho:.3g})"
+    formula = f" (2/(2 + rho), rho = {rho:.4g})"
     return Remedy(why=why, value=_typed(good), formula=formula, exchanged=exchanged, constant=constant)
 
 

@@ -84,7 +84,7 @@ def unreadable(path: Path, most: int) -> str | None:
     if stat.S_ISDIR(found.st_mode):
         return "a file is needed, this is a folder"
     if not stat.S_ISREG(found.st_mode):
-        return "a regular file is needed, this is a pipe or a device"
+        return "a regular file is needed, this is a pipe or a device; write its content to a file first"
     if found.st_size > most:
         return f"a file of at most {most / 1e6:g} MB is needed, this one has {found.st_size / 1e6:.0f} MB"
     return None

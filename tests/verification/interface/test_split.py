@@ -1,13 +1,17 @@
 """Cells of rectangles that both diagonals split: the same as quadrilaterals of a mesh file, in every result."""
 
 import json
+import re
+from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
+from mesh_writer import write_gmsh22
 from problem_list import blocks, changed
 
 import verification as vf
+from fem1d2d import rectangle
 
 BOTH = {"body1": {"split": "both"}, "body2": {"split": "both"}}
 SHAPE = ("shape", "x", "y", "cells", "split")
@@ -88,3 +92,30 @@ def test_hertz_near_incompressibility_is_warned_of_on_one_diagonal_only():
     said, silent = (vf.build(vf.Problem.from_dict(each)).warnings for each in (data, changed(data, **BOTH)))
     assert any('split = "both" of a rectangle' in words for words in said)
     assert not any("near 1/2" in words for words in silent)
+
+
+def diagonals_in_one_direction(path, x, y, cells, rising):
+    """A rectangle of triangles whose diagonals are parallel, as a Gmsh file."""
+    flat = rectangle(x, y, cells)
+    node = np.arange(len(flat.points)).reshape(cells[0] + 1, cells[1] + 1)
+    a, b, c, d = node[:-1, :-1].ravel(), node[1:, :-1].ravel(), node[1:, 1:].ravel(), node[:-1, 1:].ravel()
+    halves = ((a, b, c), (a, c, d)) if rising else ((a, b, d), (b, c, d))
+    write_gmsh22(path, flat.points, np.vstack([np.column_stack(half) for half in halves]), flat.sides)
+    return {"mesh": str(path)}
+
+
+def test_rho_of_section_6_by_the_diagonals_of_its_cells_is_what_the_first_page_says(tmp_path):
+    page = (Path(__file__).parents[3] / "docs" / "first_run.md").read_text("utf-8")
+    told = re.search(r"kind of cells: (0\.\d+) .*?(0\.\d+) .*?(0\.\d+) .*?(0\.\d+)\s", page, re.DOTALL)
+    model = vf.example("section6")
+    files = []
+    for risings in ((True, True), (True, False)):
+        data = model.to_dict()
+        for name, rising in zip(("body1", "body2"), risings, strict=True):
+            of = data[name]
+            ends = [tuple(float(end) for end in of[axis]) for axis in "xy"]
+            file = diagonals_in_one_direction(tmp_path / f"{name}{rising}.msh", *ends, of["cells"], rising)
+            data[name] = {key: value for key, value in of.items() if key not in SHAPE} | file
+        files.append(vf.Problem.from_dict(data))
+    problems = [model, vf.Problem.from_dict(changed(model.to_dict(), **BOTH)), *files]
+    assert told.groups() == tuple(f"{vf.measure(each).rho_max.value:.3f}" for each in problems)
