@@ -284,7 +284,7 @@ EXERCISES = {
     "theorem_and_experiment.3": Exercise(
         "theta at k_e", lambda rho, a: [(2 - a * math.sqrt(rho)) / (2 + rho - a * math.sqrt(rho))], last_theta,
         {"Did you forget the root of rho?": lambda rho, a: [(2 - a * rho) / (2 + rho - a * rho)],
-         "This is the best theta without friction.": lambda rho, a: [2 / (2 + rho)]},
+         "This is the theta that is predicted as best.": lambda rho, a: [2 / (2 + rho)]},
     ),
     "prediction.1": Exercise(
         "the number of further steps, and the step at which the run ends",
