@@ -24,6 +24,9 @@ FENCE = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 
+#: A comment, as that which puts a paragraph on a slide.
+COMMENT = re.compile(r"^% .*\n\n?", re.MULTILINE)
+
 #: The line of what a page needs, which is emphasised as a whole.
 NEEDS = re.compile(r"^\*(Needs .*)\*$", re.MULTILINE)
 
@@ -64,6 +67,8 @@ def plain(text: str, values: Mapping[str, str], shown: Shown) -> str:
     'rho is 3, by Theorem 3 and the trace.'
     >>> plain("(5.12) is {verdict}`5.12`, see [two bars](two_bars.md).", {}, shown)
     '(5.12) is PROVED, see two bars.'
+    >>> plain("% slide 2\\n\\nTwo bars meet.", {}, shown)
+    'Two bars meet.'
     >>> plain("*Needs {doc}`one`.  5 minutes.*", {}, lambda role, target, title: f"*{target}*")
     '*Needs one.  5 minutes.*'
     >>> print(plain(":::{prf:theorem} Small\\n:label: thm-zero\\n\\n$$ K < 1 $$ (eq-K)\\n:::", {}, shown))
@@ -97,7 +102,7 @@ def plain(text: str, values: Mapping[str, str], shown: Shown) -> str:
         space, label = match.groups()
         return f"{space}\\tag{{{shown('eq', label, '').strip('()')}}}{space}$$"
 
-    text = FENCE.sub(fence, text)
+    text = COMMENT.sub("", FENCE.sub(fence, text))
     text = TARGET.sub("", text)
     text = GLUE.sub(lambda match: values[match[1]], text)
     text = LEDGER.sub(lambda match: quote(*match[1].split()), text)

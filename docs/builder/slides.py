@@ -1,4 +1,4 @@
-"""Decks of slides cut from pages: titles, first sentences, formulas, figures, widgets and exercises."""
+"""Decks of slides cut from pages: what marks in their sources choose, else first sentences, formulas and figures."""
 
 from __future__ import annotations
 
@@ -22,8 +22,11 @@ from builder import widgets
 #: What follows the first sentences of a section on its slide: the first of these.
 SHOWN = (nodes.math_block, nodes.table, nodes.enumerated_list, theorem_node)
 
-#: A comment in the source that puts the block below it on a slide, and one that leaves a section out.
-MARK, NONE = "slide", "no slide"
+#: A comment in the source that puts the next block, or so many, whole on a slide: ``% slide`` or ``% slide 3``.
+MARK = re.compile(r"slide(?: (\d+))?")
+
+#: A comment that leaves a section out, or the figure or widget below it.
+NONE, NOT_THIS = "no slide", "not on a slide"
 
 SENTENCE = re.compile(r"[.?!](?=\s|$)|:$")
 LINES = 22  # of a listing on one slide: more would have letters too small for the back of a hall
@@ -42,11 +45,14 @@ class Slide:
         The section of the page from which it is taken.
     blocks : list of nodes
         What stands below the heading.
+    opens : bool
+        True for the first slide of a page.
     """
 
     title: list[nodes.Node]
     anchor: str
     blocks: list[nodes.Node] = field(default_factory=list)
+    opens: bool = False
 
 
 class SlidesRole(SphinxRole):
@@ -131,48 +137,88 @@ def in_parts(block: nodes.Node) -> list[nodes.Node]:
     return [nodes.literal_block(text, text, **block.attributes) for text in parts]
 
 
-def cut(page: nodes.document) -> Iterator[Slide]:
-    """The slides of a page, in its order.
+def argument(found: list[nodes.Node], formula: nodes.Node) -> list[nodes.Node]:
+    """A formula with the whole paragraph that introduces it, and with what goes on behind it in small letters."""
+    begin = end = found.index(formula)
+    is_math = lambda at: 0 <= at < len(found) and isinstance(found[at], nodes.math_block)
+    is_text = lambda at: 0 <= at < len(found) and isinstance(found[at], nodes.paragraph)
+    goes_on = lambda at: is_text(at) and found[at].astext()[:1].islower()
+    while is_math(begin - 1) or ((is_math(begin) or goes_on(begin)) and is_text(begin - 1)):
+        begin -= 1
+    while goes_on(end + 1) or (goes_on(end) and is_math(end + 1)):
+        end += 1
+    return found[begin : end + 1]
 
-    Each section has a slide with its title, its first sentences and its first formula, table, list or theorem, or the
-    output of a cell; each further formula, each figure and widget has one; each exercise has one.
+
+def marked(found: list[nodes.Node]) -> Iterator[list[nodes.Node]]:
+    """The slides that the marks of a section choose."""
+    for i, block in enumerate(found):
+        mark = MARK.fullmatch(block.astext()) if isinstance(block, nodes.comment) else None
+        if mark:
+            below = [one for one in found[i:] if not isinstance(one, nodes.comment)]
+            yield below[: int(mark[1] or 1)]
+
+
+def unmarked(found: list[nodes.Node], *, opens: bool) -> Iterator[list[nodes.Node]]:
+    """The slides of a section without marks.
+
+    First the first sentences, with the first formula, table, list or theorem, or the output of a cell, or a figure; a
+    page opens with a whole paragraph and nothing else. Then each further formula. All formulas come with their
+    :func:`argument`.
     """
-    for section in page.findall(nodes.section):
+    paragraph = next((block for block in found if isinstance(block, nodes.paragraph)), None)
+    if paragraph is None:
+        return
+    arguments = [argument(found, block) for block in found if isinstance(block, nodes.math_block)]
+    if opens:
+        yield [paragraph]
+    else:
+        first = opening(paragraph)
+        shown = [block for block in found if isinstance(block, SHOWN)]
+        outputs = [block for block in found if isinstance(block, nodes.literal_block)]
+        shown += [block for block in outputs if not block.astext().startswith("<")]  # no repr of an object
+        shown = shown or [block for block in found if isinstance(block, nodes.figure)]
+        if first.astext().rstrip().endswith(":"):  # what it announces comes next
+            shown = found[found.index(paragraph) + 1 :][:1] + shown
+        beside = next((one for one in arguments if shown and shown[0] in one), shown[:1])
+        yield [*([] if paragraph in beside else [first]), *beside]
+    seen: list[nodes.Node] = [] if opens else beside
+    for one in arguments:
+        if one[-1] not in seen:
+            seen = [*seen, *one]
+            yield one
+
+
+def cut(page: nodes.document) -> Iterator[Slide]:
+    """The slides of a page, in its order: for each section those that are marked, or else those of :func:`unmarked`.
+
+    Each figure and widget that is on none of them has a slide; each exercise has one.
+    """
+    for number, section in enumerate(page.findall(nodes.section)):
         if not isinstance(section[0], nodes.title):  # what a theorem says
             continue
         found = list(blocks(section))
-        marks = {block.astext(): i for i, block in enumerate(found) if isinstance(block, nodes.comment)}
-        if NONE in marks:
+        says = [block.astext() if isinstance(block, nodes.comment) else "" for block in found]
+        if NONE in says:
             continue
-        title, anchor = section[0].children, section["ids"][0]
-        first = Slide(title=title, anchor=anchor)
-        paragraph = next((block for block in found if isinstance(block, nodes.paragraph)), None)
-        pictures = [block for block in found if isinstance(block, nodes.figure) or is_widget(block)]
-        if paragraph is not None:
-            first.blocks.append(opening(paragraph))
-            shown = [block for block in found if isinstance(block, SHOWN)]
-            outputs = [block for block in found if isinstance(block, nodes.literal_block)]
-            shown += [block for block in outputs if not block.astext().startswith("<")]  # no repr of an object
-            if first.blocks[0].astext().rstrip().endswith(":"):  # what it announces comes next
-                shown = found[found.index(paragraph) + 1 :][:1] + shown
-            marked = [found[i + 1] for text, i in marks.items() if text == MARK]
-            if marked or shown:
-                first.blocks.append((marked or shown)[0])
-            elif pictures and not is_widget(pictures[0]):
-                first.blocks.append(pictures.pop(0))
-            *kept, last = first.blocks
+        own = list(marked(found)) or list(
+            unmarked([one for one in found if not isinstance(one, nodes.comment)], opens=not number)
+        )
+        taken = [block for one in own for block in one]
+        for before, block in zip(["", *says], found, strict=False):
+            picture = isinstance(block, nodes.figure) or is_widget(block)
+            if picture and block not in taken and before != NOT_THIS:
+                own.append([block])
+        own.sort(key=lambda one: found.index(one[0]) if one[0] in found else -1)
+        for i, one in enumerate(own):
+            *kept, last = one
             last, *rest = in_parts(last)
-            first.blocks = [*kept, last]
-            yield first
-            yield from (Slide(title=title, anchor=anchor, blocks=[part]) for part in rest)
-            for formula in (block for block in found if isinstance(block, nodes.math_block)):
-                if formula not in first.blocks:
-                    said = [block for block in found[: found.index(formula)] if isinstance(block, nodes.paragraph)][-1]
-                    words = [] if said is paragraph else [opening(said)]
-                    yield Slide(title=title, anchor=anchor, blocks=[*words, formula])
-        yield from (Slide(title=title, anchor=anchor, blocks=[picture]) for picture in pictures)
+            for shown in ([*kept, last], *([part] for part in rest)):
+                yield Slide(
+                    title=section[0].children, anchor=section["ids"][0], blocks=shown, opens=not number and not i
+                )
         for slide in filter(None, map(exercise, found)):
-            slide.anchor = anchor
+            slide.anchor = section["ids"][0]
             yield slide
 
 
@@ -252,7 +298,7 @@ class Decks:
             body = "".join(self.html(page, block) for block in slide.blocks)
             link = f"{self.builder.get_relative_uri(deck(page), page)}#{slide.anchor}"
             yield (
-                f'<section class="slide"><div><h2>{title}</h2>{body}</div>'
+                f'<section class="slide{" opens" * slide.opens}"><div><h2>{title}</h2>{body}</div>'
                 f'<footer><a href="{link}">on the page</a></footer></section>'
             )
 

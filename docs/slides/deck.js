@@ -18,17 +18,22 @@
     if (!single()) slides[at].scrollIntoView();
   }
 
-  // The text of each slide, smaller where it would leave the slide.
+  // The text of each slide, larger where it would leave much of the slide empty, and smaller where it would leave it.
   function fit() {
     const least = parseFloat(getComputedStyle(document.querySelector("footer")).fontSize);
-    for (const map of document.querySelectorAll("svg.map")) map.style.zoom = single() ? least / 10 : 1; // 10: its smallest letters
     for (const slide of slides) {
       const inner = slide.firstElementChild;
       inner.style.fontSize = "";
-      for (let size = 1; single() && size >= 0.72; size -= 0.04) {
+      const most = slide.querySelector(":scope > div > figure") ? 1 : 1.4; // letters fill what text leaves empty
+      for (let size = most; single() && size >= 0.72; size -= 0.04) {
         inner.style.fontSize = `${size}em`;
         if (inner.scrollHeight <= slide.clientHeight - 2 * inner.offsetTop && inner.scrollWidth <= inner.clientWidth) break;
       }
+    }
+    for (const map of document.querySelectorAll("svg.map")) {
+      const before = map.style.zoom;
+      map.style.zoom = single() ? least / 10 : 1; // 10: its smallest letters
+      if (map.style.zoom !== before) map.closest("figure").dispatchEvent(new Event("zoomed"));
     }
   }
 

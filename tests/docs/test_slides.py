@@ -1,4 +1,4 @@
-"""The slides of a lecture are cut from its pages, work by keys and by clicks, and fit.
+"""The slides of a lecture are cut from its pages, finish their sentences, work by keys and by clicks, and fit.
 
 Run on a built site: ``PYTHONPATH=tests python tests/docs/test_slides.py docs/_build/html`` prints what is wrong and
 exits with 1.
@@ -14,112 +14,8 @@ from pathlib import Path
 
 import pytest
 from browser import BROWSER, DRIVER, chromium, needs_browser
+from decks import DOCS, SLIDE, cut_short, faults, lectures, links, unreadable
 from processes import sites
-
-DOCS = Path(__file__).parents[2] / "docs"
-
-#: At least so many slides in each deck: a title, the sections, three exercises.
-FEWEST = 11
-
-SLIDE = re.compile(r'<section class="slide">.*?</section>', re.DOTALL)
-#: How a displayed formula begins.
-FORMULA = r"\["
-
-WIDGET = re.compile(r'data-widget="(\w+)"')
-
-
-def links(page: Path) -> list[Path]:
-    """The decks to which a page leads, without those of its navigation."""
-    found = re.findall(r'href="([^"#]+-slides\.html)"', page.read_text("utf-8"))
-    return list(dict.fromkeys((page.parent / link).resolve() for link in found))
-
-
-def pages_of(deck: Path) -> list[Path]:
-    """The pages from which a deck is cut."""
-    found = re.findall(r'<footer><a href="([^"#]+)#', deck.read_text("utf-8"))
-    return list(dict.fromkeys(deck.parent / link for link in found))
-
-
-def script(widget: str) -> str:
-    """The script that fills a widget."""
-    return widget if (DOCS / "widgets" / f"{widget}.js").exists() else "scenes"
-
-
-def faults(site: Path, lectures: int) -> list[str]:
-    """Lines ``deck: what is wrong``: lectures without a deck, few slides, missing files, pages and widgets."""
-    decks, found = links(site / "lecturers.html"), []
-    if len(decks) != lectures:
-        found.append(f"lecturers.html: {len(decks)} decks for {lectures} lectures")
-    for deck in decks:
-        if not deck.exists():
-            found.append(f"{deck.name}: no such deck")
-            continue
-        text = deck.read_text("utf-8")
-        slides = SLIDE.findall(text)
-        if len(slides) < FEWEST:
-            found.append(f"{deck.name}: {len(slides)} slides")
-        found += [f"{deck.name}: a slide without a title" for slide in slides if "<h2></h2>" in slide]
-        for file in re.findall(r'(?:src|href)="([^"#:]+)', text):
-            if not (deck.parent / file).exists():
-                found.append(f"{deck.name}: {file} is missing")
-        shown = {name for page in pages_of(deck) for name in WIDGET.findall(page.read_text("utf-8"))}
-        if any(FORMULA in page.read_text("utf-8") for page in pages_of(deck)) > (FORMULA in text):
-            found.append(f"{deck.name}: its pages have displayed formulas, and no slide has one")
-        if shown != set(WIDGET.findall(text)):
-            found.append(f"{deck.name}: needed the widgets {sorted(shown)}")
-        found += [f"{deck.name}: no script of {name}" for name in shown if f'/{script(name)}.js"' not in text]
-    return found
-
-
-#: The slides that leave the window, before and after all questions of widgets are answered.
-BEYOND = """
-const beyond = () => [...document.querySelectorAll(".slide")].flatMap((slide, i) => {
-  const inner = slide.firstElementChild, room = slide.clientHeight - 2 * inner.offsetTop;
-  const wide = [...inner.children].some((part) => part.getBoundingClientRect().right > innerWidth + 1);
-  return inner.scrollHeight > room + 1 || inner.scrollWidth > inner.clientWidth + 1 || wide ? [i + 1] : [];
-});
-const before = beyond();
-document.querySelectorAll(".ask .reveal").forEach((button) => button.click());
-return [...new Set([...before, ...beyond()])];
-"""
-
-
-#: The slides with letters below a 45th of their height: 24 pixels on a projector of 1920 x 1080.
-SMALL = """
-return [...document.querySelectorAll(".slide")].flatMap((slide, i) => {
-  const walk = document.createTreeWalker(slide, NodeFilter.SHOW_TEXT), sizes = [];
-  while (walk.nextNode()) {
-    const parent = walk.currentNode.parentElement, range = document.createRange();
-    range.selectNode(walk.currentNode);
-    if (!walk.currentNode.textContent.trim() || parent.closest("mjx-container")) continue;
-    if (!range.getBoundingClientRect().width) continue;
-    const drawn = parent.closest("svg") ? parent.getScreenCTM() : { a: 1, b: 0 };
-    sizes.push(parseFloat(getComputedStyle(parent).fontSize) * Math.hypot(drawn.a, drawn.b));
-  }
-  return Math.min(...sizes) < innerHeight / 45 - 0.1 ? [i + 1] : [];
-});
-"""
-
-
-def unreadable(decks: list[Path]) -> list[str]:
-    """Lines ``deck: slide`` for slides that leave a window of 1280 x 720 pixels or have small letters."""
-    from selenium.webdriver.support.ui import WebDriverWait
-
-    found = []
-    with chromium("--window-size=1280,720") as browser:
-        size = {"width": 1280, "height": 720, "deviceScaleFactor": 1, "mobile": False}
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        for deck in decks:
-            browser.get(deck.as_uri())
-            WebDriverWait(browser, 120).until(lambda b: b.execute_script("return document.body.dataset.ready"))
-            found += [f"{deck.name}: slide {n} has small letters" for n in browser.execute_script(SMALL)]
-            found += [f"{deck.name}: slide {n} overflows" for n in browser.execute_script(BEYOND)]
-    return found
-
-
-def lectures() -> int:
-    """The rows of the plan."""
-    return len(re.findall(r"^\| \d+ \| \{doc\}", (DOCS / "lecturers.md").read_text("utf-8"), re.MULTILINE))
 
 
 def test_each_row_of_the_plan_links_the_deck_of_its_pages() -> None:
@@ -176,9 +72,21 @@ characters for a sentence that says nothing at all.
 
 ## A formula
 
-The formula is {math}`y = x`, as a {ref}`picture <fig-dot>` shows. More.
+The formula is {math}`y = x`, as a {ref}`picture <fig-dot>` shows. LONG So
 
 $$ y = x $$
+
+and, what goes on,
+
+$$ x = y . $$
+
+% not on a slide
+
+:::{figure} dot.svg
+:alt: A dot that is on the page only
+
+No slide.
+:::
 
 :::{figure} dot.svg
 :name: fig-dot
@@ -222,13 +130,19 @@ $$ y = 1 $$ (eq-line)
 
 ## Marked
 
-A section with a list that is marked.
+A section with a paragraph and a list that are marked, and no other of its parts.
 
 $$ z = 1 $$
 
-% slide
+% slide 2
+
+The whole paragraph. LONG
 
 - The list.
+
+% slide
+
+The last slide of the section.
 
 ## Exercises
 
@@ -243,20 +157,24 @@ Done.
 ::::
 """
 
-FIRST = FIRST.replace("SEVERAL", "".join(f"line {n}\n" for n in range(30)))
+#: More than the first sentences of a slide.
+LONG = " ".join(f"Sentence {n} says nothing more than any other sentence here." for n in range(8))
 
-SECOND = "# Too long\n\nA screen.\n\n" + "1. a line\n" * 90
+FIRST = FIRST.replace("LONG", LONG).replace("SEVERAL", "".join(f"line {n}\n" for n in range(30)))
+
+SECOND = "# Too long\n\nA screen.\n\n## A list\n\nIt is long.\n\n" + "1. a line\n" * 90
 
 SAID = [
-    "A page about \\(x\\) It begins. A second sentence is short.",
+    f"A page about \\(x\\) {' '.join(FIRST.splitlines()[2:5])}",
     "A page about \\(x\\) [widget]",
-    "A formula The formula is \\(y = x\\), as a picture shows. More. \\[ y = x \\]",
+    f"A formula The formula is \\(y = x\\), as a picture shows. {LONG} So"
+    " \\[ y = x \\] and, what goes on, \\[ x = y . \\]",
     "A formula [picture] A dot.",
     "A theorem It is true. Theorem (Small) Then \\(K &lt; 1\\) .",
     f"A long listing A file: {' '.join(f'line {n}' for n in range(22))}",
     f"A long listing {' '.join(f'line {n}' for n in range(22, 30))}",
-    "Marked A section with a list that is marked. The list.",
-    "Marked \\[ z = 1 \\]",
+    f"Marked The whole paragraph. {LONG} The list.",
+    "Marked The last slide of the section.",
     "Exercise 1: try Do it. (5 min)",
 ]
 
@@ -270,7 +188,7 @@ def small(site_tools, builder, tmp_path_factory):
         builder.widgets.write(folder / "own")
     static, own = str(DOCS / "slides"), str(folder / "own")
     conf = CONF.format(docs=str(DOCS), static=static, own=own, widgets=[str(DOCS / "widgets")])
-    dot = '<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1"/>'
+    dot = '<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1" viewBox="0 0 1 1"/>'
     files = {"conf.py": conf, "index.md": PLAN, "first.md": FIRST, "second.md": SECOND, "dot.svg": dot}
     files["mathjax.js"] = ""
     for path, text in files.items():
@@ -319,7 +237,7 @@ def test_the_plan_counts_the_slides_of_a_deck_and_numbers_those_of_widgets_and_f
 
 
 def test_a_deck_with_few_slides_and_one_without_its_files_are_found(small, tmp_path):
-    expected = [f"first-slides.html: {len(SAID)} slides", "second-slides.html: 1 slides"]
+    expected = [f"first-slides.html: {len(SAID)} slides", "second-slides.html: 2 slides"]
     decks = [line for line in faults(small, 2) if "lecturers.html is missing" not in line]
     assert decks == expected
     shutil.copytree(small, tmp_path / "site")
@@ -332,15 +250,31 @@ def test_a_deck_with_few_slides_and_one_without_its_files_are_found(small, tmp_p
     assert "second-slides.html: no such deck" in found
 
 
+def test_an_introduction_that_is_cut_and_a_marked_paragraph_that_is_missing_are_found(small, tmp_path):
+    shutil.copytree(small, tmp_path / "site")
+    deck = tmp_path / "site" / "first-slides.html"
+    assert cut_short(tmp_path / "site", deck) == []
+    text = deck.read_text("utf-8")
+    deck.write_text(text.replace(f"{LONG} So", "So").replace("The last slide of", ""), encoding="utf-8")
+    cut, missing = cut_short(tmp_path / "site", deck)
+    assert cut.startswith("first-slides.html: a formula after a part of a paragraph: The formula is")
+    assert missing == "first-slides.html: marked in its source, and on no slide: The last slide of the section"
+
+
 @needs_browser
-def test_a_slide_that_overflows_and_one_with_small_letters_are_found_and_the_others_fit(small):
-    decks = [small / "first-slides.html", small / "second-slides.html", small / "third-slides.html"]
-    picture = '<svg viewBox="0 0 9 9" width="9" height="9"><text y="9" font-size="9">x</text></svg></h2>'
-    decks[2].write_text(decks[0].read_text("utf-8").replace("</h2>", picture, 1), encoding="utf-8")
-    assert unreadable(decks) == [
-        "second-slides.html: slide 1 overflows",
-        "third-slides.html: slide 1 has small letters",
-    ]
+def test_a_slide_that_overflows_and_those_with_small_letters_are_found_and_the_others_fit(small):
+    decks = [small / f"{name}-slides.html" for name in ("first", "second", "third")]
+    drawn = '<svg viewBox="0 0 9 9" width="9" height="9"><text y="9" font-size="9">x</text></svg></h2>'
+    text = decks[0].read_text("utf-8").replace("</h2>", drawn, 1).replace("_images/dot.svg", "small.svg")
+    decks[2].write_text(text, encoding="utf-8")
+    glyph = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100"><g transform="scale(0.01 -0.01)"/></svg>'
+    (small / "small.svg").write_text(glyph, encoding="utf-8")
+    overflows, small_words, small_picture = unreadable(decks)
+    assert overflows == "second-slides.html: slide 2 overflows"
+    assert small_words == "third-slides.html: slide 1 has small letters"
+    assert re.fullmatch(
+        r"third-slides.html: slide 4 has a picture with letters of \d\.\d pixels of 1080", small_picture
+    )
 
 
 @needs_browser
