@@ -3,6 +3,7 @@
 (() => {
   "use strict";
   const CHAINS = { links: "the inequality by itself", friction: "the friction term to (5.30)", lipschitz: "the change of T to (5.38)" };
+  const INEQUALITIES = { "(5.13)": "friction by displacements", "(5.11)": "one displacement by the other", "(5.19)": "displacement by force", "(5.23)": "dual by energy norm" };
   const PARTS = { claims: "Statement", wrong: "What is wrong", repair: "Repaired", proof: "Proof", reading: "Rests on", note: "Note" };
 
   // Text with formulas between dollar signs, for MathJax.
@@ -11,12 +12,16 @@
   function make(figure, name) {
     const f = ndFormulas, data = ndData[name], { base, own, steps, width } = data;
     const unitStep = data.losses.friction.find((loss) => loss.only_unit);
-    const largest = data.losses.friction.filter((loss) => loss !== unitStep).reduce((a, b) => (a.decades > b.decades ? a : b));
+    const links = data.losses.friction.filter((loss) => loss !== unitStep), largest = links.reduce((a, b) => (a.decades > b.decades ? a : b));
+    const option = ({ label }) => `${label}, ${INEQUALITIES[label]}`, noLink = "none of these: the unit of stress";
     const widget = nd.build(figure, {
       name,
       question: "On the way from the largest friction term found to its printed bound (5.30): which step adds the most powers of ten?",
-      answers: ["(5.13), friction by displacements", "(5.23), dual by energy norm", "none of these: the unit of stress"],
-      reveal: () => `In MPa the unit of stress adds ${unitStep.decades.toFixed(1)}, although no inequality loses anything there. `
+      answers: [...links.map(option), noLink],
+      right: largest.decades < unitStep.decades ? noLink : option(largest),
+      wrong: Object.fromEntries(links.map((loss) => [option(loss), loss === largest ? "no inequality adds more, but another step does."
+        : `it adds ${loss.decades.toFixed(1)}, and another inequality adds more.`])),
+      reveal: () => `in MPa the unit of stress adds ${unitStep.decades.toFixed(1)}, although no inequality loses anything there. `
         + `Of the inequalities ${largest.label} loses most: ${largest.decades.toFixed(1)}.`,
       draw,
     });
@@ -94,7 +99,7 @@
         const lost = data.losses[chain].filter((loss) => labels.includes(loss.label)).map((loss) => at(chain, loss));
         const sum = lost.includes(null) ? null : lost.reduce((a, b) => a + b, 0), printed = edge.classList.contains("printed");
         edge.classList.toggle("unknown", sum === null && !printed);
-        edge.setAttribute("stroke-width", pixels((sum ?? 0) + (printed ? more : 0)).toFixed(1));
+        edge.setAttribute("stroke-width", pixels(widget.revealed ? (sum ?? 0) + (printed ? more : 0) : 0).toFixed(1));
         edge.dataset.decades = (printed ? at("friction", unitStep) : sum) ?? "";
       }
       const rows = Object.entries(CHAINS).flatMap(([chain, words]) => data.losses[chain].map((loss) => {
@@ -113,8 +118,13 @@
     }
 
     nd.start(widget, figure);
-    const first = boxes["5.30"].getBoundingClientRect(), view = frame.getBoundingClientRect();
-    frame.scrollTo(first.left + first.width / 2 - view.left - view.width / 2, name === "map" ? first.top - view.top - view.height / 2 : 0);
+    const centre = () => {
+      const first = boxes["5.30"].getBoundingClientRect(), view = frame.getBoundingClientRect();
+      frame.scrollBy(first.left + first.width / 2 - view.left - view.width / 2, name === "map" ? first.top + first.height / 2 - view.top - view.height / 2 : 0);
+    };
+    new ResizeObserver(centre).observe(frame);
+    figure.addEventListener("zoomed", centre); // a deck makes its letters larger
+    centre();
   }
 
   for (const name of ["map", "chain"]) nd.onPage(name, (figure) => make(figure, name));

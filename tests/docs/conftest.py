@@ -69,7 +69,8 @@ def browser(driver, page, builder):
         for name in (*builder.questions.PAGES, *builder.questions.FURTHER)
     }
     states = [f"{name}.{slider['name']}={slider['start']}" for name, slider in first.items()]
+    states += ["cobweb.theta=1", "plane.unit=0", "spectrum.step=0", "map.unit=0", "chain.unit=0"]
     driver.get("about:blank")
-    driver.get(f"{page.as_uri()}#{'&'.join(['cobweb.theta=1', 'plane.unit=0', 'spectrum.step=0', *states])}")
+    driver.get(f"{page.as_uri()}#{'&'.join(states)}")
     yield driver
     assert [entry["message"] for entry in driver.get_log("browser")] == []

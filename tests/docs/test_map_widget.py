@@ -140,15 +140,29 @@ def test_the_table_and_the_button_show_the_losses_of_the_problem(browser):
 
 @needs_browser
 @pytest.mark.parametrize("name", MAPS)
-def test_the_question_is_answered_with_the_numbers_of_the_problem(browser, name):
-    losses = of_the_library(values(browser, name))
-    frame(browser, name).find_elements("css selector", ".ask button")[0].click()
-    told = frame(browser, name).find_element("css selector", ".told").text
-    unit = next(loss for loss in losses.friction if loss.only_unit)
-    most = max((loss for loss in losses.friction if not loss.only_unit), key=lambda loss: loss.decades)
-    assert told.startswith("You said: (5.13)")
-    assert f"the unit of stress adds {unit.decades:.1f}" in told
-    assert f"{most.label} loses most: {most.decades:.1f}" in told
+def test_each_answer_is_judged_with_the_numbers_of_the_problem(unanswered, name):
+    """The edges are thin until somebody answers; each inequality of the friction term can be chosen."""
+    losses = of_the_library(values(unanswered, name))
+    (unit,) = (loss for loss in losses.friction if loss.only_unit)
+    inequalities = [loss for loss in losses.friction if not loss.only_unit]
+    most = max(inequalities, key=lambda loss: loss.decades)
+    assert set(decades(unanswered, name)[1].values()) == {1.2}
+    options = [button.text for button in frame(unanswered, name).find_elements("css selector", ".ask button")][:-1]
+    assert [option.partition(",")[0] for option in options[:-1]] == [loss.label for loss in inequalities]
+    assert unit.decades > most.decades
+    said = []
+    for at, _ in enumerate(options):
+        unanswered.refresh()
+        frame(unanswered, name).find_elements("css selector", ".ask button")[at].click()
+        said.append(frame(unanswered, name).find_element("css selector", ".told").text)
+    for loss, told in zip(inequalities, said, strict=False):
+        begins = "Not quite: no inequality" if loss is most else f"Not quite: it adds {loss.decades:.1f}"
+        assert told.startswith(begins)
+    assert said[-1].startswith("Right: in MPa")
+    for told in said:
+        assert f"the unit of stress adds {unit.decades:.1f}" in told
+        assert f"{most.label} loses most: {most.decades:.1f}" in told
+    assert max(decades(unanswered, name)[1].values()) > 1.2
 
 
 @needs_browser

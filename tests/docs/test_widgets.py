@@ -173,7 +173,8 @@ def test_each_widget_with_a_right_answer_is_answered_below(builder):
     scripts = {path.stem: path.read_text("utf-8") for path in (DOCS / "widgets").glob("*.js")}
     asks = {name for name, text in scripts.items() if re.search(r"^ +right: ", text, re.MULTILINE)}
     found = builder.widgets.WIDGETS.items()
-    assert {name for name, one in found if (one.script or name) in asks} == set(ANSWERS)
+    assert {name for name, one in found if (one.script or name) in asks - {"map"}} == set(ANSWERS)
+    assert "map" in asks  # test_map_widget answers it
 
 
 @needs_browser

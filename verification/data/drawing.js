@@ -2,6 +2,7 @@
 window.nd = (() => {
   "use strict";
   const SVG = "http://www.w3.org/2000/svg";
+  const GREEK = { theta: "\u03b8", rho: "\u03c1", kappa: "\u03ba", lambda: "\u03bb" }, LETTERS = /\b(theta|rho|kappa|lambda)\b/g;
   const COLOURS = { blue: "#0072b2", red: "#d55e00", green: "#009e73", orange: "#e69f00", grey: "#777777", sky: "#56b4e9" };
 
   function html(tag, attributes = {}, ...children) {
@@ -20,7 +21,7 @@ window.nd = (() => {
     if (content === null) return node;
     const lower = 3;
     let shifted = 0;
-    for (const part of mathematics(content, (words) => svg("tspan", { "font-size": "85%", dy: lower }, words))) {
+    for (const part of mathematics(String(content).replace(LETTERS, (name) => GREEK[name]), (words) => svg("tspan", { "font-size": "85%", dy: lower }, words))) {
       node.append(shifted && typeof part === "string" && part ? svg("tspan", { dy: -lower }, part) : part);
       shifted = typeof part !== "string";
     }
