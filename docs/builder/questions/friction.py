@@ -116,7 +116,7 @@ def data() -> dict[str, Any]:
 def _cone(k: float) -> list[Any]:
     """The edge of the cone, and its name where no run is."""
     name = (
-        (LARGEST[1] * k - 1.3, LARGEST[1] - 0.3) if k < 3 else (LARGEST[0] - 0.3, min(LARGEST[1], LARGEST[0] / k) - 0.8)
+        (LARGEST[1] * k - 1.4, LARGEST[1] - 0.3) if k < 3 else (LARGEST[0] - 0.3, min(LARGEST[1], LARGEST[0] / k) - 1.0)
     )
     return [line([(0, 0), (LARGEST[0], LARGEST[0] / k)], "grey", dashed=True), note(*name, "edge", anchor="end")]
 
