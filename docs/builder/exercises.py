@@ -10,17 +10,23 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 
 import verification as vf
-from ndtheory import energy_norms
+from ndtheory import PRINTED, Constants, energy_norms, evaluate
 from ndtheory.moduli import Moduli, half_planes
 from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.rates import StepRatio
 from verification.bounds.verdicts import judge
+from verification.constants.measuring import normal_pencil
+from verification.interface.pair import ContactPair
+from verification.semidefinite.losses import locate
 
 RECORD = Path(__file__).resolve().parents[2] / "verification" / "data" / "exercises.json"
 
@@ -162,6 +168,45 @@ def all_thetas(rho: float, low: float, high: float) -> Numbers:
     return 1 - theta + theta * high, theta, 2 / (2 + rho)
 
 
+def normal_ends() -> list[float]:
+    """The ends of the spectrum of the pressed plates of ``open_or_closed``, for normal displacements."""
+    plates = vf.example("section6").changed(friction=0, young=(20000, 40000), cells=((10, 2), (6, 2)))
+    values = eigh(*normal_pencil(vf.build(plates)), eigvals_only=True)
+    return [float(values[0]), float(values[-1])]
+
+
+@cache
+def plates() -> ContactPair:
+    """The plates of ``printed_theorem``."""
+    return vf.build(vf.example("section6"))
+
+
+def constants() -> Constants:
+    """Their constants."""
+    return vf.measure(plates()).constants()
+
+
+def power(of: Constants) -> list[float]:
+    """The power of m that is nearest to the quotient of the printed and the repaired bound, without their roots."""
+    m, S = float(of.m), float(of.M * of.C_R + of.C_K)
+    return [float(round(math.log(m**3 * (S + 1) / (S / m + 1), m)))]
+
+
+def slope(of: Constants) -> list[float]:
+    """The power of the unit of stress by which the printed threshold grows where m is a large number."""
+    ends = []
+    for power in (-8, -6):
+        unit = of.m * Fraction(10) ** power
+        scaled = Constants(m=of.m / unit, M=of.M / unit, C_R=of.C_R, C_s=of.C_s / unit, C_tr=of.C_tr, k=of.k)
+        ends.append(evaluate(PRINTED, scaled).C2.value)
+    return [math.log10(ends[1] / ends[0]) / 2]
+
+
+def bar() -> float:
+    """The decades that (5.23) loses."""
+    return next(loss.decades for loss in locate(plates(), vf.measure(plates())).friction if loss.label == "(5.23)")
+
+
 EXERCISES = {
     "two_bars.1": Exercise(
         "both ends of the interval of g", lambda rho: (0.1, 0.1 * (1 + 1 / rho)),
@@ -178,6 +223,11 @@ EXERCISES = {
         "m for E = L = 1", lambda t: [1 / (1 + 1 / t**2)], lambda: [math.pi / 2],
         {SQUARE: lambda t: [1 / (1 + 1 / t)], "Is the frequency upside down?": lambda t: [1 / (1 + t**2)],
          "This is the ratio t of the integrals. What is m with it?": lambda t: [t**2]},
+    ),
+    "open_or_closed.1": Exercise(
+        "theta, and its factor",
+        lambda low, high: (energy_norms.tied_theta(low, high), energy_norms.tied_rate(low, high)), normal_ends,
+        {TIED: lambda low, high: (energy_norms.predicted_theta(high), energy_norms.predicted_rate(high))},
     ),
     "open_or_closed.2": Exercise(
         "the ratio of the steps for rho = 1, and its limit for large rho", lambda *rho: [cost(x) for x in rho],
@@ -246,6 +296,20 @@ EXERCISES = {
         "the length under [norm]", lambda mm: [1 / mm], lambda: [0.001],
         {"Is it the other way round? One millimetre is how many micrometres?": lambda mm: [mm],
          "Square millimetres? A length is asked for.": lambda mm: [1 / mm**2]},
+    ),
+    "printed_theorem.1": Exercise(
+        "the power of m", power, lambda: [constants()],
+        {"That is the lost factor alone. Where else does m become 1?": lambda of: [1],
+         "Those are the factors outside. What does the bracket gain?": lambda of: [3]},
+    ),
+    "printed_theorem.2": Exercise(
+        "the slope", slope, lambda: [constants()],
+        {"Does C_s in the denominator of k change with the unit, too?": lambda of: [slope(of)[0] - 1]},
+    ),
+    "printed_theorem.3": Exercise(
+        "the decades gained, and those left of the bar", lambda won, bar: (won, bar - won),
+        lambda: [math.log10(constants().M / constants().m), bar()],
+        {"Does the estimate enter the bound squared?": lambda won, bar: (won / 2, bar - won / 2)},
     ),
     "friction.1": Exercise(
         "k_s and k_e",

@@ -115,7 +115,9 @@ def test_an_answer_with_too_few_digits_is_neither_right_nor_wrong(name, answer, 
     assert (vf.check(name, answer) == SHORT) == short
 
 
-@pytest.mark.parametrize("name", [name for name in KNOWN if all(isinstance(x, float) for x in KNOWN[name]["right"])])
+@pytest.mark.parametrize(
+    "name", [name for name in KNOWN if all(isinstance(x, float) and x < 100 for x in KNOWN[name]["right"])]
+)
 def test_an_answer_rounded_to_two_digits_is_right_or_asked_for_a_third(name):
     assert vf.check(name, [float(f"{x:.2g}") for x in KNOWN[name]["right"]]) in ("right", SHORT)
 
