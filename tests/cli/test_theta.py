@@ -146,7 +146,8 @@ def test_the_screen_of_a_run_says_which_residual_is_meant_and_what_is_sure(call)
     for said in (
         "|Tg - g| is multiplied by 1.4 in each step, absolute and unrelaxed",
         "For the relative residual |Tg - g|/|Tg| that coupling libraries log, use --log",
-        "without friction, and with solvers more accurate than that level, rho is at least 19; with friction",
+        "without friction, if a longer run stays there too, and with solvers more accurate than that level, "
+        "rho is at least 19; with friction",
         "rho is at least 23",
         "rises and falls has no steady ratio: give 1",
     ):

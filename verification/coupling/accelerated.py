@@ -152,5 +152,5 @@ def after_accelerated(spectrum: Spectrum | None, kind: Kind) -> NextRun:
     ends = f"2/(2 + least + largest) with lambda from {few(spectrum.low)} to {few(spectrum.high)} by Aitken's factors"
     if kind.linear:
         return NextRun(theta=theta, why=f"{ends}, the largest with {100 * MARGIN:g} % added: an estimate")
-    why = f"{ends}, an estimate for one contact pattern; its log, with constant relaxation, shows whether it holds"
+    why = f"{ends}, an estimate for one contact pattern; with constant theta its log shows if it holds or diverges"
     return NextRun(theta=theta, why=why)

@@ -21,9 +21,11 @@ from verification.coupling.kinds import CONTACT, LARGEST_TO_PASTE, Kind, kind_of
 from verification.coupling.log_files import Log, read_log
 from verification.coupling.pace import CONVERGED, RELATIVE, Pace
 from verification.coupling.readings import (
+    NARROWEST,
     NextRun,
     Observed,
     RunReading,
+    best_if,
     few,
     kept,
     level,
@@ -60,8 +62,8 @@ UNNAMED = (
 #: A pooled ratio exceeds 1 - theta, the pace of open nodes, by this share of theta.
 BEYOND = Fraction(1, 20)
 
-#: The reason for the run after one of parallel coupling that does not converge.
-STAYS = "a quarter of {}, which does not converge; the log of that run narrows rho, if it has absolute residuals"
+#: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
+SMALLEST_THETA = Fraction(1, 10**6)
 
 #: What windows show that are too short one by one.
 WINDOWS = "windows show no ratio one by one; their second halves have a ratio of {} together"
@@ -69,9 +71,6 @@ WINDOWS = "windows show no ratio one by one; their second halves have a ratio of
 #: A window too short to be read does not converge where it has FEW steps, and its last residual is this share of the
 #: largest one; a run is kept that converges within SHORT iterations without a ratio.
 HIGH, FEW, SHORT = 0.9, 5, 40
-
-#: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
-SMALLEST_THETA = Fraction(1, 10**6)
 
 
 def advise_logs(
@@ -101,15 +100,9 @@ def advise_logs(
     The theta to paste is predicted to take at most 1.4 times the fewest steps wherever the smallest and the largest
     eigenvalue may lie by the logs (:mod:`verification.coupling.ends`); in contact it is not above the theta of a run
     that converged.  Where a single log decides rho, the smallest eigenvalue is taken to be at most half of the largest.
-    The prediction is for couplings of about five modes and more: one or two modes may need fewer steps.
 
-    A log that prints the factor of Aitken for each iteration shows both ends of the spectrum, as estimates
-    (:mod:`verification.coupling.accelerated`), and with ``tied`` they decide theta where no log with constant theta
-    does. Logs of quasi-Newton runs show only how many iterations they took.
-
-    Of a coupling of kind general each log shows one end of the spectrum and limits the other
-    (:mod:`verification.coupling.general`); in *parallel* coupling the stiffest mode is the slowest in every log, so
-    that ``r^2 = (1 - theta)^2 + theta^2 rho``.
+    :mod:`verification.coupling.accelerated` reads logs with Aitken's factors, and :mod:`verification.coupling.general`
+    those of kind general; in *parallel* coupling the stiffest mode is the slowest in every log.
 
     The run to make next has a theta that no log has, unless its reason begins with "keep it" or "the same again".
 
@@ -117,8 +110,7 @@ def advise_logs(
     ----------
     logs : iterable of tuple
         Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1 (100 of
-        kind general); None
-        if the log names its factor, or if the relaxation was not constant.
+        kind general); None if the log names its factor, or if the relaxation was not constant.
     tied : bool
         True if the interface is tied, so that nothing opens or slips.  A run is linear then, and the softest or the
         stiffest mode sets its steady ratio: two logs mostly show both, and so the best theta,
@@ -231,7 +223,8 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
     if not kind.signed:
         return bare if ratio is None else replace(bare, readings=general.readings_of(theta, ratio))
     if kind.parallel and bare.stays:
-        readings, following = (level(theta),), NextRun(theta=rounded_down(theta / 4), why=STAYS.format(few(theta)))
+        why = f"a quarter of {few(theta)}, which hardly converges, if at all; absolute residuals of that run narrow rho"
+        readings, following = (level(theta),), NextRun(theta=rounded_down(theta / 4), why=why)
     elif kind.parallel and ratio is not None:
         readings, following, rho = read_parallel(theta, ratio, kind)
     elif ratio is not None and grows:
@@ -240,16 +233,15 @@ def seen_log(log: Log, theta: Fraction, kind: Kind = CONTACT, friction: bool = F
             also = [reading for reading in read_plateau(theta, plateau)[0] if reading.kind == "plateau"]
             readings = (*readings[:1], *also, *readings[1:])
         if bare.explodes:
-            least = (1 + ratio.least) / theta - 1
-            why = f"2/(2 + rho) with rho = {few(least)}, the least one whose residual grows so fast"
-            following = NextRun(theta=max(rounded_down(predicted_theta(least)), float(SMALLEST_THETA)), why=why)
+            because = "the least one whose residual grows so fast"
+            following = best_if((1 + ratio.least) / theta - 1, because, SMALLEST_THETA)
     elif plateau is not None:
         readings, following = read_plateau(theta, plateau)
         if (other := bare.rho_elsewise) is not None:
             words = f"; if these data are not relaxed, rho is {few(other)}"
             readings = tuple(replace(one, says=one.says + words * (one.kind == "plateau")) for one in readings)
     elif bare.stays:
-        readings, following, _ = read_observed(theta, Observed.known(Fraction(1)), kind)
+        readings, following, _ = read_observed(theta, Observed.of(1, 1 - min(NARROWEST, theta / 5), 1), kind)
         if all(column.residual in RELATIVE for column in columns if column.count("level")):
             readings = (level(theta),)  # of a relative residual also a run that grows
     elif ratio is not None:
@@ -269,7 +261,7 @@ def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
     if ratio.most <= ends.SWIFT:
         return kept(theta, f"{why}, and none much faster is to be found")
     beyond = ratio.value > 1 - theta + BEYOND * theta  # then only the stiffest mode has this pace
-    following = read_observed(theta, Observed.known(ratio.value) if beyond else ratio, converges=False)[1]
+    following = read_observed(theta, Observed.known(ratio.value) if beyond else ratio)[1]
     accelerated = "of an Aitken or IQN-ILS run this says nothing: give its vectors to ndtheory advise vectors"
     return replace(following, why=f"{why}: {following.why}; {accelerated}")
 
@@ -342,30 +334,24 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Deci
     else:
         base = next((log for log in logs if log.readings), max(logs, key=lambda log: log.length))
     if interval.contradiction is not None:
-        if kind.linear and falling:
-            why = "it falls fastest; the logs contradict each other"
-            return base.readings, kept(_steepest(falling)[1], why), None
-        why = "half of the smallest theta, in one time window, with ResAbs in the log: the logs contradict each other"
-        return base.readings, NextRun(theta=_half(logs), why=why), None
-    lo, tied = interval.lo, kind.linear
+        why = "the logs contradict each other"
+        return contrary(logs, base, kind, why, ", in one time window, with ResAbs in the log")
+    lo = interval.lo
     if (swift := next((log for log in logs if log.swift), None)) is not None and base.rho is None:
         why = f"{_within(swift.paces)}: there are few steps to gain"
         return swift.readings, kept(swift.theta, why), None
     if kind.parallel:
         return base.readings, base.next, base.rho
-    by_all = lambda: by_ends(logs, base, None if lo is None else lo.value, kind)
-    if tied and (found := by_all()) is not None:
-        return found
+    by_all = by_ends(logs, base, None if lo is None else lo.value, kind) if kind.linear or base.rho is None else None
+    if by_all is not None:
+        return by_all
     if base.rho is not None:
         return base.readings, robust(logs, base.next), base.rho
-    if (found := by_all()) is not None:
-        return found
     if not falling and len(rising) > 1:
+        if lo is not None and predicted_theta(lo.value) < base.theta / 4:
+            return base.readings, best_if(lo.value, "the least one by these logs, of which none converges"), None
         why = "a quarter of the smallest theta so far, as none converges; the log of that run narrows rho"
-        smaller = base.theta / 4
-        if lo is not None and predicted_theta(lo.value) < smaller:
-            smaller, why = predicted_theta(lo.value), f"2/(2 + {few(lo.value)}), as none converges"
-        return base.readings, NextRun(theta=rounded_down(smaller), why=why), None
+        return base.readings, NextRun(theta=rounded_down(base.theta / 4), why=why), None
     return base.readings, base.next, None
 
 
@@ -396,9 +382,7 @@ def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, kind:
             return None
         why = "no linear coupling with real eigenvalues has all of these logs: a coupling with convection, one that is "
         why += "not linear, or leave out tied"
-        if falling := [log for log in logs if log.converges]:
-            return base.readings, kept(_steepest(falling)[1], f"it falls fastest; {why}"), None
-        return base.readings, NextRun(theta=_half(logs), why=f"half of the smallest theta; {why}"), None
+        return contrary(logs, base, kind, why)
     stiffest, rising = max(box.b[1] for box in boxes), [float(log.theta) for log in logs if log.diverges]
     if math.isinf(stiffest):
         return None
@@ -438,14 +422,13 @@ def cost_in_words(boxes: Sequence[Box], dear: float, kind: Kind) -> str:
     return f"{times} if {ends_in_words(boxes)}, {where}"
 
 
-def _steepest(falling: Sequence[SeenLog]) -> tuple[Fraction, Fraction]:
-    """The ratio and the theta of the log that falls fastest."""
-    return min((log.slowest.most, log.theta) for log in falling if log.slowest is not None)
-
-
-def _half(logs: Sequence[SeenLog]) -> float:
-    """Half of the smallest theta."""
-    return rounded_down(min(log.theta for log in logs) / 2)
+def contrary(logs: Sequence[SeenLog], base: SeenLog, kind: Kind, why: str, how: str = "") -> Decision:
+    """The run that falls fastest, to be kept, or half of the smallest theta, where logs do not go together."""
+    falls = [(log.slowest.most, log.theta) for log in logs if log.converges and log.slowest is not None]
+    if falls and kind.linear:
+        return base.readings, kept(min(falls)[1], f"it falls fastest; {why}"), None
+    half = rounded_down(min(log.theta for log in logs) / 2)
+    return base.readings, NextRun(theta=half, why=f"half of the smallest theta{how}: {why}"), None
 
 
 def robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:

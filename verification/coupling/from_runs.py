@@ -6,22 +6,11 @@ from collections.abc import Iterable
 from typing import Any
 
 from ndtheory.constants import LARGEST, SMALLEST, take
-from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import Numeric
 from verification.coupling import general
 from verification.coupling.advice import Advice
-from verification.coupling.kinds import LARGEST_TO_PASTE, Kind, kind_of
-from verification.coupling.readings import (
-    Made,
-    NextRun,
-    Observed,
-    few,
-    read_observed,
-    read_parallel,
-    rounded_down,
-    spread,
-    steps_needed,
-)
+from verification.coupling.kinds import Kind, kind_of
+from verification.coupling.readings import Made, Observed, best_if, read_observed, read_parallel, spread, steps_needed
 from verification.coupling.runs import OneRun, decided
 from verification.coupling.runs_with_friction import friction_bounds, next_with_friction, readings_with_friction
 
@@ -49,8 +38,7 @@ def advise_run(
     * ``level``: contact opens and closes alternately, where r is about 1 or the growth does not last.  Without friction
       theta does not contract, so that rho is at least ``2/theta - 1``.
 
-    With friction these bounds are false: a coupling with rho = 0.97 had a ratio of 0.9022 at theta = 0.1, where the
-    first one is 18.  :mod:`verification.coupling.runs_with_friction` has the bounds that are proved then.
+    With friction these bounds are false: :mod:`verification.coupling.runs_with_friction` has those that are proved.
 
     Parameters
     ----------
@@ -138,7 +126,6 @@ def advise_run(
         following = next_with_friction(falling, [at for at, _ in rising])
     elif of.linear and rho is None and r > 1 + spread(t):
         rho = (1 + r) / t - 1
-        why = f"2/(2 + rho) with rho = {few(rho)}, the pace at which a tied run grows"
-        following = NextRun(theta=rounded_down(min(predicted_theta(rho), LARGEST_TO_PASTE)), why=why)
+        following = best_if(rho, "the pace at which a tied run grows")
     found = decided(made, readings, following, rho, kind=of, friction_bounds=bounds)
     return Advice.of(OneRun(**found, **known))

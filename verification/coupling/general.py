@@ -94,4 +94,4 @@ def decide(each: Sequence[Sequence[Box]], made: Sequence[Made]) -> tuple[NextRun
     if any(same_run(theta, one.theta) for one in made):
         return readings.fastest_of(falling or made), None
     why = f"its ratio shows the other end: lambda is from {least - 1:.3g} to {most - 1:.3g} by the runs so far"
-    return NextRun(theta=rounded_down(theta), why=why), None
+    return readings.at_risk(NextRun(theta=rounded_down(theta), why=why), made), None

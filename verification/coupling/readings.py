@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar, Literal
 
@@ -27,7 +27,7 @@ def shows_most(kind: Kind) -> str:
     """The run that shows most: with theta = 1 a mode is multiplied by ``-lambda``, and an open node by 0."""
     tends = "sqrt(rho)" if kind.parallel else "rho" if kind.signed else "the largest |lambda|"
     given = kind.given("if nothing slips or opens, ")
-    return f"ten steps with theta = 1, if they may be run: {given}their ratio tends to {tends}"
+    return f"ten steps with theta = 1, if they may be run, as they may diverge: {given}their ratio tends to {tends}"
 
 
 def or_at_one(least: float, kind: Kind) -> str:
@@ -202,13 +202,12 @@ def spread(theta: Fraction) -> Fraction:
 
 
 def read_observed(
-    theta: Fraction, ratio: Observed, kind: Kind = CONTACT, *, converges: bool = True, measured: bool = False
+    theta: Fraction, ratio: Observed, kind: Kind = CONTACT, *, measured: bool = False
 ) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """Every reading of a ratio of residuals at theta, the run to make next, and rho of the only reading.
 
     :func:`verification.coupling.from_runs.advise_run` explains the readings.  Bounds hold for the ratio within its
-    limits, and no reading of a part is left out.  rho is None where there are several readings.  Without ``converges``
-    nobody knows that a run with this theta does where the ratio is below 1.
+    limits, and no reading of a part is left out.  rho is None where there are several readings.
     """
     r = ratio.value
     high = (1 + r) / theta - 1
@@ -230,8 +229,6 @@ def read_observed(
         following = min(between if between >= SHORTEST_STEP * theta else 3 * theta / 2, (1 + theta) / 2)
         confirmed = f"a ratio of {few(following * (1 + high) - 1)} there confirms mode-high"
         why = f"larger; {confirmed}, a smaller one rules it out"
-        if converges and following * (1 + high) >= 2:
-            why += f"; if the residual does not fall there, keep {few(theta)}, which converges"
     rho = high if kinds == ["mode-high"] else None
     return readings, NextRun(theta=rounded_down(following), why=why), rho
 
@@ -314,10 +311,8 @@ def level(theta: Fraction, bounds: bool = True) -> RunReading:
     least = 2 / theta - 1
     says = "contact opens and closes alternately, and the residual stays at a level or grows for a while only"
     if bounds:
-        says += (
-            f": without friction, and with solvers more accurate than that level, rho is at least {_at_least(least)}"
-        )
-        says += "; with friction this does not bound rho"
+        says += ": without friction, if a longer run stays there too, and with solvers more accurate than that level, "
+        says += f"rho is at least {_at_least(least)}; with friction this does not bound rho"
     else:
         says += ", or the solvers of both sides are not more accurate: this says nothing about rho"
     return RunReading(kind="level", lo=below(least) if bounds else None, says=says)
@@ -340,6 +335,12 @@ def same_run(theta: Fraction | float, other: Fraction) -> bool:
 def kept(theta: Fraction, why: str) -> NextRun:
     """The theta of a run that is to be kept."""
     return NextRun(theta=float(theta), why=why if why.startswith("keep it") else f"keep it: {why}", kept=True)
+
+
+def best_if(rho: Fraction, because: str, least: Fraction = Fraction(0)) -> NextRun:
+    """The best theta for a rho, no smaller than the ``least`` one that may be given."""
+    theta = max(min(predicted_theta(rho), LARGEST_TO_PASTE), least)
+    return NextRun(theta=rounded_down(theta), why=f"2/(2 + rho) with rho = {few(rho)}, {because}")
 
 
 def fastest_of(made: Sequence[Made]) -> NextRun:
@@ -368,6 +369,15 @@ def pasted_or_not(following: NextRun, made: Sequence[Made]) -> NextRun | None:
         return None
     twin = next((one for one in made if same_run(following.theta, one.theta)), None)
     return following if twin is None or following.kept else kept(twin.theta, following.why)
+
+
+def at_risk(following: NextRun, made: Sequence[Made]) -> NextRun:
+    """The run that is proposed, with a warning where it is none of those made and no such theta or larger one falls."""
+    low = max((one.theta for one in made if one.falls), default=Fraction(0))
+    if following.kept or following.again or following.theta <= low:
+        return following
+    falls = f"; {few(low)} falls, and so does a smaller theta" if low else ""
+    return replace(following, why=f"{following.why}; it may diverge there{falls}")
 
 
 def anew(following: NextRun, made: Sequence[Made]) -> NextRun:

@@ -20,6 +20,7 @@ from verification.coupling.readings import (
     NextRun,
     RunReading,
     anew,
+    at_risk,
     or_at_one,
     pasted_or_not,
     steps_needed,
@@ -203,7 +204,7 @@ def decided(
     if rho is not None and (paste := pasted_or_not(following, made)) is not None:
         following = paste
     else:
-        following, rho = anew(following, made), None
+        following, rho = at_risk(anew(following, made), made), None
         learns = not following.kept and friction_bounds is None
         if learns and not any(one.rises or one.theta >= LIKE_ONE for one in made):
             following = replace(following, why=following.why + or_at_one(0, kind))

@@ -85,13 +85,8 @@ def with_friction(logs: Sequence[SeenLog]) -> tuple[tuple[RunReading, ...], Next
     """The readings of the log that decides most and the run to make next; logs decide no rho with friction."""
     falling, rising = by_kind(logs)
     if not falling and not rising:
-        return (
-            (),
-            next(
-                (kept(log.theta, log.next.why) for log in logs if log.swift), max(logs, key=lambda log: log.length).next
-            ),
-            None,
-        )
+        swift = (kept(log.theta, log.next.why) for log in logs if log.swift)
+        return (), next(swift, max(logs, key=lambda log: log.length).next), None
     decides = max(theta for theta, _ in falling) if falling else min(theta for theta, _ in rising)
     readings = next(log.readings for log in logs if log.theta == decides and (log.converges or log.diverges))
     return readings, next_with_friction(falling, [theta for theta, _ in rising]), None

@@ -42,7 +42,7 @@ AGREE = Fraction(103, 100)
 
 #: Assumption under which a ratio bounds rho from below, and from above.
 FROM_BELOW = "no friction, or a tied interface"
-MORE_ACCURATE = ", and solvers that are more accurate than the level at which the residual stays"
+MORE_ACCURATE = ", a residual that stays at its level in a longer run too, and solvers that are more accurate than that"
 RATIOS_RISE = ", and a norm in which the coupling is symmetric, so that ratios only rise"
 TIED = "a tied interface"
 LINEAR = "a linear coupling with real eigenvalues"
@@ -349,7 +349,8 @@ def bounds(logs: Sequence[SeenLog], kind: Kind = CONTACT) -> tuple[list[LogBound
             lower.append(LogBound(value=rho(ratio.least, theta), log=log, says=says, assumes=assumes))
         if log.diverges:
             assumes = given(FROM_BELOW) + MORE_ACCURATE * log.stays
-            lower.append(LogBound(value=2 / theta - 1, log=log, says="it does not converge", assumes=assumes))
+            says = "its residual grows, or stays at a level"
+            lower.append(LogBound(value=2 / theta - 1, log=log, says=says, assumes=assumes))
         if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):
             says = f"the relative residual of relaxed data stays at {few(plateau.value)}"
             lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=given(TIED)))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import verification as vf
 from verification.coupling.pace import pooled
-from verification.coupling.readings import Made, NextRun, anew, kept, pasted_or_not
+from verification.coupling.readings import Made, NextRun, anew, at_risk, kept, pasted_or_not
 
 
 def level(steps):
@@ -125,6 +125,37 @@ def test_where_a_run_was_made_the_next_one_lies_in_the_gap_above_those_that_fall
     assert again(0.4, fell("0.4"), fell("0.3", F(1, 3)), stayed("0.42")).theta == 0.3
     assert again(0.3, kept_run := fell("0.3")) != anew(kept(F(3, 10), "best"), [kept_run])
     assert again(0.4, fell("0.4"), stayed("0.46")).theta == pytest.approx(math.sqrt(0.4 * 0.46), rel=1e-3)
+
+
+# --- a run that may diverge says so ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("slow", [-0.9, -0.9999, -1.001])
+@pytest.mark.parametrize("share", [1.0, 1e-9])
+@pytest.mark.parametrize("steps", [6, 24, 80])
+@pytest.mark.parametrize("options", [{}, {"tied": True}, {"friction": True}, {"kind": "general"}], ids=str)
+def test_a_run_that_is_asked_for_falls_or_is_said_to_diverge_perhaps(tmp_path, slow, share, steps, options):
+    """Modes of factors 0.6 to 0.1 beside a share of one close to -1, in one log and in two."""
+    for theta, earlier in ((0.05, None), (0.3, None), (0.3, 0.1), (0.3, 0.29)):
+        z = np.array([0.4, 0.7, 0.9, 1 - slow]) / theta
+        series = {
+            at: np.linalg.norm((1 - at * z[:, None]) ** np.arange(steps) * [[1], [1], [1], [share]], axis=0)
+            for at in (earlier, theta)
+            if at
+        }
+        found = advised(tmp_path, [(repr(at), [float(r) for r in each]) for at, each in series.items()], **options)
+        if found.theta is None and np.abs(1 - found.next.theta * z).max() > 1 + 1e-9:
+            again = any(found.next.theta == at for at in series)
+            assert again or "may diverge" in found.next.why
+
+
+def test_the_warning_names_what_falls_and_leaves_out_smaller_thetas():
+    falls, rises = Made(theta=F(3, 10), falls=True), Made(theta=F(4, 10), falls=False, rises=True)
+    why = lambda theta, *made, **more: at_risk(NextRun(theta=theta, why="so", **more), made).why
+    assert why(0.35, falls, rises) == "so; it may diverge there; 0.3 falls, and so does a smaller theta"
+    assert why(0.3, falls, rises) == why(0.2, falls) == "so"
+    assert why(0.2, rises) == "so; it may diverge there"
+    assert why(0.4, rises, again=True) == why(0.4, rises, kept=True) == "so"
 
 
 # --- what converges is kept ------------------------------------------------------------------------------------------
