@@ -20,7 +20,7 @@ from verification.algorithm.relaxation import InverseStep, Rule, rule_of
 from verification.coupling.advice import Advice
 from verification.coupling.kinds import kind_of
 from verification.coupling.spectrum import Spectrum
-from verification.coupling.vectors import bears, last_piece, seen_in
+from verification.coupling.vectors import DOUBLE, bears, last_piece, seen_in
 from verification.interface.matrices import real_array
 from verification.value import Value
 
@@ -448,7 +448,7 @@ def _answer(name: str, solver: Solver, given: Floats, iterations: int) -> Floats
 def _grows(seen: list[Evaluation]) -> bool:
     """True if each of the last PACE steps has a larger residual than the one before."""
     some = seen[-1 - PACE :]
-    return len(some) > PACE and all(before.residual < after.residual for before, after in pairwise(some))
+    return len(some) > PACE and all(before.residual * (1 + DOUBLE) < after.residual for before, after in pairwise(some))
 
 
 def _steps_left(history: list[float], tolerance: float) -> int | None:

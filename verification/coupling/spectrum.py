@@ -111,18 +111,16 @@ class Spectrum(Value):
 
     @property
     def theta(self) -> float:
-        """The theta of fewest steps for both ends, as far apart as their errors allow, or of least factor.
+        """The theta of fewest steps for both ends, the upper one with its error, or of least factor.
 
         Of an estimate with real eigenvalues both ends arrive together from equal first errors: the residual of a stiff
         mode is 1 + lambda times its error, so that theta is a little below ``2/(2+low+high)``, which it is where the
         ends are known.  0 where a mode grows for any theta above 0.
         """
-        low, high = self.low - self.error_low, self.high + self.error_high
         if self.low <= -1:
             return 0.0
         if self.real:
-            low = max(low, 0.0) if self.low >= 0 else low if low > -1 else self.low
-            a, b = 1 + low, 1 + high
+            a, b = 1 + self.low, 1 + self.high + self.error_high
             if self.source != "vectors" or not TOLERANCE < a < (1 - TOLERANCE) * b:
                 return 2 / (a + b)
             cost = lambda theta: max(math.log(z / TOLERANCE) / -math.log(abs(1 - theta * z)) for z in (a, b))

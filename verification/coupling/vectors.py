@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,9 @@ WRONG_SIGN = (
     "solvers with noise or a memory, one that is far from linear, one solver with the wrong sign (the second one must "
     "return the force that acts on the first body), or positive feedback (kind general)"
 )
+
+#: What two evaluations show.
+MEMORY = "noise or a memory of the solvers, as one iterate given twice shows"
 
 _ERRORS = "estimated errors of both ends"
 _UNKNOWN: dict[str, Any] = {
@@ -188,14 +192,12 @@ class Vectors(Evidence, Value):
             return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.high_found:
             return ""
-        said, course = "rho is not found yet: these are too few independent directions", self.course
-        tops = ", ".join(f"{high:.3g}" for high in course)
-        if self.kind.signed and falls(course):
-            causes = (
-                "noise or a memory of the solvers, as one iterate given twice shows, or a solver that is not linear"
-            )
-            return f"more iterates show a smaller rho ({tops}), as of no linear symmetric coupling: {causes}"
-        if len(course) > 1:
+        said = "rho is not found yet: these are too few independent directions" + " above the noise" * bool(self.apart)
+        tops = ", ".join(f"{high:.3g}" for high in self.course)
+        if odd := unsymmetric(self.kind, self.spectrum, self.course):
+            causes = f"{MEMORY}, a solver that is not linear, or convection (kind general)"
+            return f"{odd.format(tops)}, as of no linear symmetric coupling: {causes}"
+        if len(self.course) > 1:
             said = f"rho changes with every iterate ({tops}), not found yet"
         return f"{said}; continue the run with IQN-ILS, and give more of its vectors"
 
@@ -207,8 +209,9 @@ class Vectors(Evidence, Value):
             return f"{share}: the solvers are too loose, or have a memory, so that T is not a function of x"
         if self.period:
             contact = self.kind.given("contact that opens and closes, ")
-            causes = f"{contact}solvers that are not linear, or theta at its limit, where a smaller one helps"
-            return f"no progress: the iterates come back after {self.period} steps, which these make: {causes}"
+            causes = f"{contact}solvers that are not linear, or theta at its limit, where a mode hardly decays or grows"
+            back = f"the iterates come back after {self.period} steps, up to {BACK:.0%} of a step"
+            return f"hardly any progress: {back}, which these make: {causes}; more iterates or a smaller theta tell"
         if self.kind.parallel and (self.noise or 0.0) > 1:
             needed = "needed both fields in a row, their images likewise, and solvers with less noise"
             return f"images do not follow from the other field: {needed}"
@@ -223,12 +226,13 @@ class Vectors(Evidence, Value):
         said, causes = f"an eigenvalue seems to be {least:.3g}", self.kind.given("contact that changes, ") + WRONG_SIGN
         if self.kind.signed and self.ritz.real.max() < -REAL:
             return f"all eigenvalues seem to be negative, which these make: {causes}"
-        below_0 = self.kind.linear and least < -max(REAL * (1 + abs(self.spectrum.high)), self.error_low)
+        below_0 = self.kind.linear and least < -max(REAL / 2 * (1 + abs(self.spectrum.high)), self.error_low)
         if self.kind.signed and (least <= RANK - 1 or below_0):
             return f"{said}, which these make: {causes}"
         if self.kind.parallel and not self.spectrum.parallel().theta:
             return "by these eigenvalues no theta above 0 converges with both solvers at once: run one after the other"
-        return f"{said}: with -1 or less no theta above 0 converges" if least <= RANK - 1 else ""
+        too = f"with -1 or less no theta above 0 converges; {MEMORY}, makes such eigenvalues too"
+        return f"{said}: {too}" if least <= RANK - 1 else ""
 
 
 def seen_in(
@@ -285,7 +289,7 @@ def seen_in(
     known = [whole or bool(residuals[i] <= INVARIANT * abs(values[i])) for i in (0, -1)]
     tops = [float(found[-1].real) for found in (*before, values)]
     least = [float(found[0].real) - 1 for found in (*before, values)]
-    course = tuple(top - 1 for top in tops)
+    course = tuple(top - 1 for top in tops[-1 if known[1] else 0 :])
     slows = len(tops) > FEWER and 0 <= tops[-1] - tops[-2] <= tops[-2] - tops[-3]
     rises = slows and not steady(tops) and steady(tops, RISING) and (spectrum.real or not kind.signed)
     if rises and not known[1]:
@@ -304,7 +308,7 @@ def seen_in(
         noise=noise,
         apart=_apart(X, TX, inside),
         low_found=min(least) > 0 and (known[0] or steady([1 + 1 / one for one in least])),
-        high_found=known[1] or ((steady(tops) or rises) and not (kind.signed and falls(course))),
+        high_found=(known[1] or steady(tops) or rises) and not unsymmetric(kind, spectrum, course),
         course=course,
         loaded=loaded,
         period=_period(X),
@@ -313,7 +317,15 @@ def seen_in(
 
 def falls(course: Sequence[float]) -> bool:
     """True if the largest eigenvalue falls with more iterates, which it does not where T is linear and symmetric."""
-    return 1 + max(course) > (1 + FALLS) * (1 + course[-1])
+    return any(1 + more > (1 + FALLS) * (1 + less) for more, less in combinations(course, 2))
+
+
+def unsymmetric(kind: Kind, spectrum: Spectrum, course: Sequence[float]) -> str:
+    """Signs of a coupling that is not linear or not symmetric; of contact that changes rho may go up and down, too."""
+    if kind.signed and falls(course if kind.linear else (max(course), course[-1])):
+        return "more iterates show a smaller rho ({})"
+    turns = spectrum.error_high < np.abs(spectrum.values.imag).max()
+    return "eigenvalues are complex" if kind.name == "tied" and turns and not (kind.parallel or spectrum.real) else ""
 
 
 def _before(X: Floats, TX: Floats, inside: NDArray[np.bool_], directions: int, kind: Kind) -> list[Complex]:
@@ -390,7 +402,9 @@ def _images(
     kept, again = lengths > ROUNDING * given.accuracy, lengths == 0
     if not kept.any():
         raise ValueError("the iterates do not differ above rounding: needed two different ones")
-    loud = float(np.linalg.norm(E[:, again], axis=0).max(initial=0.0))
+    changes = np.linalg.norm(E, axis=0)
+    loud = float(changes[again].max(initial=0.0))
+    kept = heard if (heard := kept & (LOUD * changes > loud)).any() else kept
     D, E = D[:, kept] / lengths[kept], E[:, kept] / lengths[kept]
     if still and (np.linalg.norm(E, axis=0) <= taken.accuracy / lengths[kept]).all():
         raise ValueError(still)
@@ -399,14 +413,14 @@ def _images(
     sizes = np.linalg.norm(images, axis=0)
     rest = sigma <= RANK * sigma[0]
     largest = float((sizes[~rest] / sigma[~rest]).max()) or 1.0
-    noise = float(sizes[rest].max()) / largest if rest.any() else None
-    rounding = np.sqrt(((Vt * (taken.accuracy / lengths[kept])) ** 2).sum(axis=1)) / largest
+    more = np.linalg.norm(E - images @ Vt, axis=0) if D.shape[1] > len(D) else []  # of more differences than unknowns
+    noise = float(max([*sizes[rest], *more])) / largest if rest.any() or len(more) else None
+    rounding = np.sqrt(((Vt * (max(taken.accuracy, loud) / lengths[kept])) ** 2).sum(axis=1)) / largest
     used = ~rest & (sigma * CLEAN >= np.maximum(rounding, noise or 0.0))
     if not used.any():
         used = sigma == sigma[0]
     if again.any():
-        felt = np.sqrt(((Vt[used] * (loud / lengths[kept])) ** 2).sum(axis=1)) / sigma[used] / largest
-        noise = max(noise or 0.0, float(felt.max()))
+        noise = max(noise or 0.0, loud and float((rounding / sigma)[used].max()))
     return U[:, used], images[:, used] / sigma[used], noise
 
 
@@ -435,9 +449,11 @@ def _apart(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> float | None:
 def _period(X: Floats) -> int:
     """The least number of steps after which the last iterates come back, over four periods; 0 where they do not."""
     step = float(np.linalg.norm(X[-1] - X[-2]))
-    apart = lambda p: np.linalg.norm(X[p:] - X[:-p], axis=1)[-3 * p :]
-    back = lambda d: step > 0 and d.max() <= BACK * step and d[-1] <= max(d[0] / 2, RETURNED * step)
-    return next((p for p in range(2, (len(X) - 1) // 4 + 1) if back(apart(p))), 0)
+    for p in range(2, (len(X) - 1) // 4 + 1):
+        apart = np.linalg.norm(X[p:] - X[:-p], axis=1)[-3 * p :] / (step or math.inf)
+        if step and apart.max() <= BACK:
+            return p if apart[-1] <= max(apart[0] / 2, RETURNED) else 0
+    return 0
 
 
 def last_piece(TX: Floats) -> int:

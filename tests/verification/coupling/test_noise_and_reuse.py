@@ -80,6 +80,54 @@ def test_a_solver_with_a_memory_is_told_and_gets_no_theta():
     assert "no theta above 0" not in advice.why_no_theta
 
 
+@pytest.mark.parametrize("rule", ["constant", "aitken", "iqn-ils"])
+@pytest.mark.parametrize(("noise", "memory"), [(1e-5, 0), (1e-3, 0), (1e-2, 0), (0, 0.01), (0, 0.08), (0, 0.1)])
+def test_directions_below_noise_or_memory_that_is_seen_count_for_no_theta(noise, memory, rule):
+    """2/(2 + 0.1 + 6) = 0.247, and 2/7 = 0.286 diverges; errors of a thousand eigenvalues gave 1e-5 once."""
+    random, state = np.random.default_rng(3), np.zeros(12)
+
+    def solver(u):
+        nonlocal state
+        state = memory * state + (1 - memory) * (1 - VALUES * (u - 1)) * (1 + noise * random.normal(size=12))
+        return state
+
+    found = twice(solver, rule=rule, max_iterations=14).advice
+    assert found.theta is None or 0.2 < found.theta < 0.28
+    assert (found.theta is not None) == (noise == 1e-5)
+
+
+def test_without_a_pair_a_memory_is_named_beside_an_eigenvalue_below_minus_1():
+    state = np.zeros(12)
+
+    def remembers(u):
+        nonlocal state
+        state = state / 2 + (1 - VALUES * (u - 1)) / 2
+        return state
+
+    start = {"start": np.zeros(12), "kind": "general", "rule": "aitken", "theta": 0.2, "max_iterations": 14}
+    why = vf.couple(lambda g: g, remembers, **start).advice.why_no_theta
+    assert "with -1 or less no theta above 0 converges; noise or a memory of the solvers" in why
+
+
+def test_more_iterates_than_unknowns_show_the_noise_without_a_pair():
+    random, X = np.random.default_rng(5), np.random.default_rng(6).normal(size=(12, 3))
+    exact = -X * [0.5, 1.0, 3.0]
+    one, other = (vf.advise_vectors(X, exact + noise * random.normal(size=(12, 3)), kind="tied") for noise in (0, 1e-3))
+    assert one.vectors.noise < 1e-12
+    assert 1e-4 < other.vectors.noise < 1e-2
+    assert other.vectors.error_high > abs(other.spectrum.high - 3)
+
+
+def test_a_tied_coupling_of_complex_eigenvalues_is_not_symmetric_or_not_linear_and_gets_no_theta():
+    """Beyond their error complex eigenvalues are of noise, of solvers that are not linear, or of convection."""
+    linear = Linear([1.0, 1.0, 3.0, 3.0], skew=2.0)
+    X = np.random.default_rng(1).normal(size=(6, 4))
+    found = {kind: vf.advise_vectors(X, [linear(x) for x in X], kind=kind) for kind in ("tied", "general", "contact")}
+    assert [one.theta is None for one in found.values()] == [True, False, False]
+    assert "eigenvalues are complex, as of no linear symmetric coupling" in found["tied"].why_no_theta
+    assert "convection (kind general)" in found["tied"].why_no_theta
+
+
 def test_noise_that_makes_an_eigenvalue_below_0_is_named_as_a_cause():
     random = np.random.default_rng(1)
     noisy = lambda v: v * (1 + 1e-6 * random.normal(size=60))
