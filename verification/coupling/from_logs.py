@@ -167,23 +167,22 @@ def advise_logs(
     accelerated = tuple(seen_accelerated(log) for log, _ in read if log.accelerator is not None)
     seen = tuple(seen_log(log, _theta_of(log, theta), of, friction) for log, theta in read if log.accelerator is None)
     spectrum, made = spectrum_of(accelerated, of), [log.made for log in seen]
-    known: dict[str, Any] = {"kind": of, "rubs": friction, "accelerated": accelerated, "logs": seen}
-    if not seen:
-        known |= {"spectrum": spectrum if of.linear else None, "interval": interval_of([], [])}
-        return Advice.of(Logs(readings=(), rho=None, next=after_accelerated(spectrum, of), **known))
     interval = interval_of(*(([], []) if friction or not of.signed else bounds(seen, of)))
+    known: dict[str, Any] = {"kind": of, "rubs": friction, "accelerated": accelerated, "logs": seen}
+    known["interval"] = interval
+    if not seen:
+        ends_seen, following = spectrum if of.linear else None, after_accelerated(spectrum, of)
+        return Advice.of(Logs(readings=(), rho=None, next=following, spectrum=ends_seen, **known))
     if not of.signed:
         steady = [(log.theta, log.slowest, log.length) for log in seen if not log.explodes]
         boxes = general.boxes_of([(at, ratio, steps) for at, ratio, steps in steady if ratio is not None])
         following, ends_seen = general.decide(boxes, made)
         readings = () if ends_seen and ends_seen.theta else next((log.readings for log in seen if log.readings), ())
-        found = Logs(readings=readings, rho=None, next=following, spectrum=ends_seen, interval=interval, **known)
+        found = Logs(readings=readings, rho=None, next=following, spectrum=ends_seen, **known)
     else:
         readings, following, rho = with_friction(seen) if friction else decide(seen, interval, of)
         with_it = friction_bounds(*by_kind(seen)) if friction else None
-        found = Logs(
-            **decided(made, readings, following, rho, kind=of, friction_bounds=with_it), interval=interval, **known
-        )
+        found = Logs(**decided(made, readings, following, rho, kind=of, friction_bounds=with_it), **known)
     undecided = found.rho is None and found.spectrum is None and interval.contradiction is None
     if undecided and of.linear and spectrum is not None:
         paste = pasted_or_not(after_accelerated(spectrum, of), made)

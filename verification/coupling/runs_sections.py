@@ -59,15 +59,13 @@ def _of_run(run: OneRun, found: Advice) -> Iterator[Section]:
 def _of_logs(logs: Logs, found: Advice) -> Iterator[Section]:
     yield _assumed(logs)
     yield from of_logs(logs)
-    if found.roles and any(row.bound for row in found.methods):
-        yield paste(found, few_methods(found))
-    else:
+    few = [few_methods(found)] if found.roles and any(row.bound for row in found.methods) else []
+    if not few:
         yield from which_method(found)
-    if found.roles and not any(row.bound for row in found.methods):
-        yield paste(found)
-    yield _end(
-        logs, found, AS_ABOVE if found.roles else "a run with theta = {0}; then this again plus --log LOG --theta {0}"
-    )
+    if found.roles:
+        yield paste(found, *few)
+    again = AS_ABOVE if found.roles else "a run with theta = {0}; then this again plus --log LOG --theta {0}"
+    yield _end(logs, found, again)
 
 
 def _end(runs: Runs, found: Advice, again: str) -> Section:

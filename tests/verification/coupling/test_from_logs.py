@@ -250,6 +250,8 @@ def test_after_several_runs_of_which_none_converges_a_quarter_comes_next():
     rising = (log("0.5", "1.5"), log("0.8", "2.2"))
     assert together(*rising)[1].theta == 0.125
     assert together(rising[0])[1] == rising[0].next
+    fast = together(log("0.5", "60"), log("0.8", "99"))[1]  # rho is at least 124: 100/0.8 - 1
+    assert fast.theta == pytest.approx(2 / 126, rel=1e-3)
     falls = log("0.1", observed("0.9", "0.5", "0.95"))
     assert together(falls, *rising)[1].theta > 0.1
 
@@ -333,7 +335,7 @@ def test_a_softest_mode_that_is_not_known_lowers_theta_and_never_raises_it():
     best = NextRun(theta=0.4, why="best")
     falls = log("0.45", "0.8")  # 1 + rho = 4
     found = from_logs.robust((falls,), best)
-    assert found.theta < 0.4
+    assert 0.34 < found.theta < 0.35  # 0.286 if the softest mode might be as stiff as the stiffest
     assert "times the fewest steps" in found.why
     assert from_logs.robust((falls,), NextRun(theta=0.2, why="less")).why == "less"
     contrary = (log("0.3", "0.95"), log("0.5", "0.2"))

@@ -254,6 +254,15 @@ def test_a_run_that_grows_a_millionfold_is_read_however_few_steps_it_has(tmp_pat
     assert short.logs[0].readings == ()
 
 
+def test_no_run_is_asked_for_at_a_theta_that_a_log_may_not_have(tmp_path):
+    assert advised(tmp_path, [("0.01", [1.0, 1e8, 1e16])]).next.theta == 1e-6
+
+
+def test_after_a_level_of_parallel_coupling_a_quarter_comes_next(tmp_path):
+    found = advised(tmp_path, [("0.5", level(80))], parallel=True)
+    assert (found.next.theta, [one.kind for one in found.readings]) == (0.125, ["level"])
+
+
 @given(runs(), st.sampled_from([{}, {"tied": True}, {"friction": True}]))
 def test_theta_1_is_named_as_the_first_run_only_where_no_run_like_it_was_made_and_none_diverges(made, options):
     with tempfile.TemporaryDirectory() as folder:
