@@ -195,7 +195,8 @@ class Vectors(Evidence, Value):
         said = "rho is not found yet: these are too few independent directions" + " above the noise" * bool(self.apart)
         tops = ", ".join(f"{high:.3g}" for high in self.course)
         if odd := unsymmetric(self.kind, self.spectrum, self.course):
-            causes = f"{MEMORY}, a solver that is not linear, or convection (kind general)"
+            causes = self.kind.given("friction, contact that changes, ") + MEMORY
+            causes += ", a solver that is not linear, or convection (kind general)"
             return f"{odd.format(tops)}, as of no linear symmetric coupling: {causes}"
         if len(self.course) > 1:
             said = f"rho changes with every iterate ({tops}), not found yet"
@@ -321,8 +322,8 @@ def falls(course: Sequence[float]) -> bool:
 
 
 def unsymmetric(kind: Kind, spectrum: Spectrum, course: Sequence[float]) -> str:
-    """Signs of a coupling that is not linear or not symmetric; of contact that changes rho may go up and down, too."""
-    if kind.signed and falls(course if kind.linear else (max(course), course[-1])):
+    """Signs of a coupling that is not linear or not symmetric; eigenvalues of contact with friction may be complex."""
+    if kind.signed and falls(course):
         return "more iterates show a smaller rho ({})"
     turns = spectrum.error_high < np.abs(spectrum.values.imag).max()
     return "eigenvalues are complex" if kind.name == "tied" and turns and not (kind.parallel or spectrum.real) else ""

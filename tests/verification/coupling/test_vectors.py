@@ -161,13 +161,16 @@ def test_complex_eigenvalues_of_contact_have_no_error_that_is_known():
         made = vf.run(problem.changed(friction=friction), theta="0.5")
         found = vf.advise_vectors([each.g for each in made.iterates], [each.image for each in made.iterates])
         assert (found.vectors.symmetric, found.vectors.error_high is not None) == (known, known)
-        assert ("no error is known" in str(found.sections())) is not known
-        assert ("rho (stiffness" in found.quote) is known
+        assert (found.theta is None) is not known  # 1.14, 1.09, 1.14 with more iterates
+        assert ("friction, contact that changes, noise" in found.why_no_theta) is not known
     rho = vf.measure(problem.changed(friction="0")).rho_normal.value
     assert abs(found.spectrum.high - rho) <= found.vectors.error_high
     turned = Linear([1.0, 1.0, 3.0, 3.0], skew=2.0)
     X = np.random.default_rng(1).normal(size=(6, 4))
     assert vf.advise_vectors(X, [turned(x) for x in X], tied=True).vectors.error_high is not None
+    slips = vf.advise_vectors(X, [turned(x) for x in X])
+    assert "no error is known" in str(slips.sections())
+    assert "rho (stiffness" not in slips.quote
 
 
 def test_noise_of_the_solvers_is_measured_and_what_it_drowns_is_left_out():
