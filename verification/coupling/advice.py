@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from ndtheory.keys import key, says
 from verification.algorithm.rates import steps
-from verification.coupling import methods, runs
+from verification.coupling import methods
 from verification.coupling.accelerated import Accelerated
 from verification.coupling.evidence import Evidence, Parallel
 from verification.coupling.kinds import BodyNumber, Kind
@@ -170,20 +170,12 @@ class Advice(Document):
         return self.evidence.if_from(OneRun)
 
     @property
-    def _runs(self) -> Runs:
-        return self.evidence.if_from(Runs) or runs.NONE
-
-    @property
-    def _logs(self) -> Logs:
-        return self.evidence.if_from(Logs) or runs.NONE
-
-    @property
     @says(
         "the possible readings of that run; for several logs the readings of the log that decides most, or the only "
         "reading that all logs leave"
     )
     def readings(self) -> tuple[RunReading, ...]:
-        return self._runs.readings
+        return found.readings if (found := self.evidence.if_from(Runs)) else ()
 
     next: NextRun | None = key(
         "the run to make next, at a theta that was not run, or the theta to paste where there are roles",
@@ -194,18 +186,17 @@ class Advice(Document):
     @property
     @says("the logs that were given, in their order; empty where none were")
     def logs(self) -> tuple[SeenLog, ...]:
-        return self._logs.logs
+        return found.logs if (found := self.evidence.if_from(Logs)) else ()
 
     @property
     @says("the logs of runs whose relaxation was not constant; `logs` has the others")
     def accelerated(self) -> tuple[Accelerated, ...]:
-        return self._logs.accelerated
+        return found.accelerated if (found := self.evidence.if_from(Logs)) else ()
 
     @property
     @says("the bounds that follow from all logs together", null="where none were given", why="no logs were given")
     def interval(self) -> RhoInterval | None:
-        found = self.evidence.if_from(Logs)
-        return None if found is None else found.interval
+        return found.interval if (found := self.evidence.if_from(Logs)) else None
 
     @property
     @says(
@@ -214,7 +205,7 @@ class Advice(Document):
         why="no run with friction was given",
     )
     def friction_bounds(self) -> FrictionBounds | None:
-        return self._runs.friction_bounds
+        return found.friction_bounds if (found := self.evidence.if_from(Runs)) else None
 
     @property
     @says(

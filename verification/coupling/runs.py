@@ -176,17 +176,6 @@ class Logs(Runs):
         return super().why_no_theta
 
 
-#: The logs of no run.
-NONE = Logs(
-    readings=(),
-    next=NextRun(theta=1.0, why=""),
-    rho=None,
-    logs=(),
-    accelerated=(),
-    interval=RhoInterval(lo=None, hi=None, contradiction=None),
-)
-
-
 def decided(
     made: Sequence[Made],
     readings: Sequence[RunReading],
