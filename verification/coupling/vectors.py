@@ -192,7 +192,7 @@ class Vectors(Evidence, Value):
             return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.high_found:
             return ""
-        said = "rho is not found yet: these are too few independent directions" + " above the noise" * bool(self.apart)
+        said = "rho is not found yet: these are too few independent directions" + " above the noise" * bool(self.noise)
         tops = ", ".join(f"{high:.3g}" for high in self.course)
         if odd := unsymmetric(self.kind, self.spectrum, self.course):
             causes = self.kind.given("friction, contact that changes, ") + MEMORY
@@ -213,7 +213,7 @@ class Vectors(Evidence, Value):
             causes = f"{contact}solvers that are not linear, or theta at its limit, where a mode hardly decays or grows"
             back = f"the iterates come back after {self.period} steps, up to {BACK:.0%} of a step"
             return f"hardly any progress: {back}, which these make: {causes}; more iterates or a smaller theta tell"
-        if self.kind.parallel and (self.noise or 0.0) > 1:
+        if self.kind.parallel and (self.noise or 0.0) > LOUD:
             needed = "needed both fields in a row, their images likewise, and solvers with less noise"
             return f"images do not follow from the other field: {needed}"
         return ""
