@@ -521,7 +521,8 @@ def advised(coupling: Coupling, unseen: bool = False) -> Advised:
     """The advice from vectors and from matrices, and the steps of each."""
     count = lambda theta, rule="constant": None if theta is None else _whole(steps(coupling, theta, rule=rule))
     states = list(islice(coupling.forces(0.5, "aitken"), 9))
-    found = vf.advise_vectors([g for g, _ in states], [image for _, image in states], tied=coupling.tied)
+    kind = "general" if isinstance(coupling, Asymmetric) else "tied" if coupling.tied else "contact"  # may be complex
+    found = vf.advise_vectors([g for g, _ in states], [image for _, image in states], kind=kind)
     if isinstance(coupling, Plates):
         role = vf.advise(coupling.pair).roles[0]
         matrices = role.advised()[0]
