@@ -61,7 +61,7 @@ def test_the_answer_fits_and_calls_the_table_of_methods_in_contact_a_prediction_
     out = form(name)[0].out
     fits(out.splitlines())
     assert "WHICH METHOD?" in out
-    warned = "Predicted as if tied: where contact changes, IQN-ILS may not arrive." in flat(out)
+    warned = "Predicted as if tied: where contact changes, IQN-ILS may not converge." in flat(out)
     assert warned == ("--tied" not in FORMS[name])
 
 
@@ -74,7 +74,7 @@ def test_it_says_how_many_steps_both_roles_take_and_who_reads_what(form, name):
     assert f"with the roles exchanged, {steps(other[rate])} steps" in said
     reads = f"solver reads forces and writes displacements, body {other['neumann_body']}'s the reverse."
     assert f"Body {document['neumann_body']}'s {reads}" in said
-    assert "For displacements (heat: temperatures) the same, but not in parallel coupling." in said
+    assert "Relax displacements (heat: temperatures) alike, except in parallel coupling." in said
 
 
 def test_roles_between_which_there_is_no_difference_are_told_so(call, tmp_path):

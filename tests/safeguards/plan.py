@@ -314,7 +314,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         (" or chosen[1] > overlap[1] + SAME * size:", ":"),
         ("abs(x[0] - ends[0]) <= off and ", ""),
         (" and abs(x[-1] - ends[1]) <= off", ""),
-        ("        if holes:", "        if False:"),
+        ("        if len(holes):", "        if False:"),
         ("    if not fits[contact]:", "    if False:"),
         ("float(ends[1] if upper else ends[0])", "float(ends[0] if upper else ends[1])"),
         ("other[:, -1].min() if upper", "other[:, -1].max() if upper"),

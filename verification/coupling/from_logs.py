@@ -395,8 +395,8 @@ def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, kind:
     theta = rounded_down(ends.telling(boxes, known, most if tied else min([most, *rising])))
     unsure = f"no theta is sure to be within {DEAR:g} times the fewest steps{grown}"
     unsure += "; any constant theta is slow with so large a rho: take IQN-ILS" * (lo is not None and lo > LARGE)
-    run = f"a run of {steps_needed(Fraction(theta))} steps or more there narrows rho"
-    why = f"{run}: as long as {ends_in_words(boxes)}, {unsure}"
+    run = f"a run of {steps_needed(Fraction(theta))} steps or more with this theta narrows rho"
+    why = f"{run}. So far {ends_in_words(boxes)}, and {unsure}"
     return base.readings, NextRun(theta=theta, why=why), None
 
 

@@ -56,8 +56,8 @@ def _least_rho(seen: ElasticBodies) -> Section:
             bounds = [role.corners[name] for role in seen.roles]
             rows.append((words, *(figures(end) for bound in bounds for end in (bound.stick, bound.slide))))
     proved = (
-        "Proved for the continuum, where both bodies are homogeneous and isotropic near one inner point of Gamma_c, "
-        "or near a corner of 90 degrees at its end; fine meshes come close. rho may be larger."
+        "Proved without a mesh if both bodies are homogeneous and isotropic near one inner point of Gamma_c, or near a "
+        "corner of 90 degrees at its end. On fine meshes rho is close to it, or larger."
     )
     return section("bounds", "HOW LARGE IS RHO AT LEAST?", Table(heads, tuple(rows)), proved)
 
@@ -79,7 +79,7 @@ def _who(found: Advice, seen: ElasticBodies) -> Section:
         says = "No difference: the bounds of both roles are the same"
         says += "." if seen.corners else ", unless one body ends in corners."
     elif found.neumann_body is not None:
-        says = f"Try body {found.neumann_body}: the bound is smaller. Two lower bounds prove no order of the roles."
+        says = f"Try body {found.neumann_body}: the bound is smaller. Lower bounds cannot prove which role is better."
         if free not in (None, found.neumann_body):
             says += f" Without friction body {free} has the smaller one."
     return which_body(says)

@@ -242,7 +242,7 @@ def which_method(found: Advice, names: Mapping[int | None, str] | None = None) -
         if found.coupling.parallel:
             said.append("Predicted for parallel coupling, in which an evaluation runs both solvers.")
         if not found.tied:
-            said.append("Predicted as if tied: where contact changes, IQN-ILS may not arrive.")
+            said.append("Predicted as if tied: where contact changes, IQN-ILS may not converge.")
         elif found.method.name != "constant":
             said.append("Predicted, not proved.")
     yield section("method", "WHICH METHOD?", table(heads, rows), *said)
@@ -349,7 +349,7 @@ def _layers(found: Advice) -> Iterator[str]:
         of = f"factor {factor} at {figures(role.theta)}, k < {figures(role.friction_threshold)}"
         said.append(f"{name_of(found, role.neumann_body)}: {of}")
     if said:
-        yield f"Predicted by layers without ends in a free norm: {'; '.join(said)}."
+        yield f"Predicted for endless layers, in a norm of a proof's choice: {'; '.join(said)}."
 
 
 def _together(said: Mapping[str, str]) -> list[str]:
@@ -376,7 +376,7 @@ def paste(found: Advice, *more: str) -> Section:
             takes = f'theta = "auto" takes the proved {float(auto.theta):.4g}'
             said.append(f"{takes}: at most twice the predicted steps.")
     both = "Both fields are relaxed: the scheme is parallel, and names both as data of the acceleration."
-    one = "For displacements (heat: temperatures) the same, but not in parallel coupling."
+    one = "Relax displacements (heat: temperatures) alike, except in parallel coupling."
     said.append(both if found.coupling.parallel else one)
     if found.theta is not None and found.theta > 1:
         said.append("preCICE takes a factor of at most 1: there use IQN-ILS, or relax in the solvers.")

@@ -31,10 +31,10 @@ WAVES = 40
 ONE_WAVE = "one wave bounds rho from below"
 
 #: Reason against the fluid as the Neumann body.
-SHORT_WAVES = "short waves have less and less added mass, so that rho would grow without end as meshes are refined"
+SHORT_WAVES = "the shorter a wave, the smaller its added mass, so that rho would grow without limit on finer meshes"
 
 #: The same against a fluid with a film coefficient.
-SHORT_WAVES_OF_HEAT = "short waves meet more and more conductance of the wall: rho would grow as meshes are refined"
+SHORT_WAVES_OF_HEAT = "the shorter a wave, the more the wall conducts, so that rho would grow on finer meshes"
 
 
 def _data(meaning: str, null: str = "where not given") -> Any:

@@ -243,7 +243,7 @@ def test_growth_bounds_the_largest_eigenvalue_from_below_and_estimates_it_only_w
     assert (low, high) == (pytest.approx(4.398), pytest.approx(4.402 * 1.03))
     steady = together(log("0.5", observed("1.2", "1.199", "1.201")), tied=True)[1]
     assert "runs that grow bound rho from below" in steady.why
-    assert "steps or more there narrows rho" in steady.why
+    assert "steps or more with this theta narrows rho" in steady.why
 
 
 def test_after_several_runs_of_which_none_converges_a_quarter_comes_next():

@@ -94,7 +94,7 @@ def test_the_screen_says_what_kind_of_number_it_is():
     said = " ".join(text(sections(vf.advise(SECTION_6))).split())
     first, _ = vf.advise(SECTION_6).layers
     shown = f"factor {first.factor.value:.4g} at {first.theta:.3g}, k < {first.friction_threshold.value:.2f}"
-    assert f"Predicted by layers without ends in a free norm: body 1: {shown}; body 2:" in said
+    assert f"Predicted for endless layers, in a norm of a proof's choice: body 1: {shown}; body 2:" in said
 
 
 def test_bodies_that_differ_too_much_for_doubles_have_none():
