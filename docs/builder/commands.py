@@ -9,8 +9,12 @@ import click
 
 HEAD = """# Commands
 
-What each command says with `--help`. With `--json` it writes one document, which {doc}`/json` describes key by key.
+The help of each command, as `--help` prints it on a terminal of 80 columns. With `--json` a command
+writes one document, which {doc}`/json` describes key by key.
 """
+
+#: Columns of a help on a terminal of 80.
+SCREEN = 78
 
 #: The line of the page of documents that says which command writes one.
 WRITTEN_BY = re.compile(r"^Written by .*", re.MULTILINE)
@@ -21,15 +25,16 @@ def commands(
 ) -> Iterator[tuple[str, click.Command, click.Context]]:
     """Every command with its words as they are typed, those of groups within too, and a context to ask it in.
 
-    The context has its parent: a command keeps the help option that it was first asked for.
+    The context has its parent: a command keeps the help option that it was first asked for.  The command is that which
+    writes the help: a group that works without the name of a command leaves it to its default.
     """
-    settings = {"max_content_width": 80, "terminal_width": 80}
+    settings = {"terminal_width": SCREEN}
     above = parent or click.Context(group, info_name=name, **{**group.context_settings, **settings})
     for word, command in group.commands.items():
-        context = click.Context(command, info_name=word, parent=above, **settings)
-        yield f"{name} {word}", command, context
+        context = command.make_context(word, [], above, resilient_parsing=True, **settings)
+        yield f"{name} {word}", context.command, context
         if isinstance(command, click.Group):
-            yield from commands(command, f"{name} {word}", context)
+            yield from commands(command, f"{name} {word}", click.Context(command, parent=above, info_name=word))
 
 
 def page(group: click.Group, name: str) -> str:

@@ -90,8 +90,8 @@ TOKEN = re.compile(r"\\[A-Za-z]+\s*|\\.|\s+|.", re.DOTALL)
 def plain(text: str) -> str:
     r"""A text with formulas between dollars, each of them written out.
 
-    >>> plain(r"$\theta \le \frac{1}{2}$ and $\sqrt{\frac{C_K}{m}}$")
-    'theta <= 1/2 and sqrt(C_K/m)'
+    >>> plain(r"$\theta \le \frac{1}{2}$ and $0 < \theta < \sqrt{\frac{C_K}{m}}$")
+    'theta <= 1/2 and 0 < theta < sqrt(C_K/m)'
     """
     parts = text.split("$")
     return "".join(_formula(part) if i % 2 else part for i, part in enumerate(parts))
@@ -130,7 +130,7 @@ def _atom(token: str, tokens: Iterator[str]) -> str:
     if token == "{":
         return "".join(_atoms(tokens, "}"))
     if not token.startswith("\\"):
-        return f" {token} " if token in RELATIONS else (" " if token.isspace() else token)
+        return f" {token} " if token in {*RELATIONS, "<", ">"} else (" " if token.isspace() else token)
     name = token[1:].strip()
     if name == "frac":
         above, below = _argument(tokens), _argument(tokens)
