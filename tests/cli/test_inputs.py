@@ -45,6 +45,17 @@ def test_the_problems_are_built_in_and_one_of_them_has_a_loading_history(inputs,
     assert "4 runs" in call("sweep", inputs / "grid.toml", "--dry-run").out
 
 
+@pytest.mark.usefixtures("meshes_read_here")
+def test_the_mesh_is_of_the_same_plates_and_its_draft_becomes_their_problem(inputs, call):
+    drafted = call("draft", inputs / "model.msh").out
+    (inputs / "draft.toml").write_text(re.sub("(?m)^# (?=fixed|prescribed)", "", drafted), "utf-8")
+    moduli = {"body1.young": "7e4", "body2.young": "2e4", "contact.radius": "0.1", "iteration.neumann_body": "1"}
+    pair = vf.build(vf.load(inputs / "draft.toml").with_keys(moduli))
+    for name, side in zip(("S1", "S2"), pair.along_y, strict=True):
+        there = np.load(inputs / f"{name}.npy")
+        assert np.allclose(side.schur, there, rtol=0, atol=1e-9 * abs(there).max())
+
+
 def test_they_are_written_again_but_over_no_file_with_another_content(inputs, call):
     assert call("example", "--inputs", inputs, "--json").document["written"].keys() == {
         str(inputs / name) for name in INPUTS
@@ -70,8 +81,9 @@ def test_each_file_that_the_list_of_commands_in_readme_reads_was_written_before(
     lines = packages["listed"]((ROOT / "README.md").read_text("utf-8"))
     assert lines[0] == "ndtheory example --inputs ."
     written = set(INPUTS)
+    assert "ndtheory draft model.msh > draft.toml" in lines
     for line in lines:
         command, *targets = re.split(r" > | -o ", line)
-        read = set(re.findall(r"[\w-]+\.(?:toml|npy|npz|mtx|log)\b", command))
+        read = set(re.findall(r"[\w-]+\.(?:toml|npy|npz|mtx|msh|log)\b", command))
         assert read <= written, line
         written |= set(targets)

@@ -60,7 +60,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     "--inputs",
     type=PATH,
     metavar="FOLDER",
-    help="Write a file for each command that reads one: problems, a sweep, matrices, vectors and a log of a run.",
+    help="Write a file for each command that reads one: problems, a mesh, a sweep, matrices, vectors, a log of a run.",
 )
 @JSON
 def example(name: str | None, inputs: Path | None, as_json: bool) -> None:

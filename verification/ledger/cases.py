@@ -7,6 +7,7 @@ about whole displacement fields on PROBLEMS.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -17,7 +18,6 @@ import meshio
 import numpy as np
 
 import fem1d2d
-from fem1d2d.mesh import Floats
 from verification.problem.specification import Problem
 
 #: Heights over lengths: a thin layer to a column.
@@ -296,19 +296,23 @@ def _written(x: tuple[float, float], y: tuple[float, float], columns: int, line:
     flat = fem1d2d.rectangle(x, y, (columns, 2))
     points = flat.points + np.column_stack([np.zeros(len(flat.points)), line(flat.points[:, 0])])
     path = Path(_folder().name) / f"{len(list(Path(_folder().name).iterdir()))}.msh"
-    write(path, points, flat)
+    write(path, plate=replace(flat, points=points))
     return str(path)
 
 
-def write(path: Path, points: Floats, mesh: fem1d2d.Mesh) -> None:
-    """Write a mesh with other points as Gmsh does, its sides as physical groups."""
-    sides: Mapping[str, Any] = mesh.sides
-    tags = [np.full(len(facets), tag) for tag, facets in enumerate(sides.values(), 1)]
-    groups = [np.concatenate(tags), np.full(len(mesh.cells), len(tags) + 1)]
+def write(path: Path, **bodies: fem1d2d.Mesh) -> None:
+    """Write bodies with the same names of sides as Gmsh does, bodies and sides as physical groups."""
+    blocks: list[tuple[str, Any]] = []
+    of, first = list[str](), 0
+    for body, mesh in bodies.items():
+        blocks += [*(("line", facets + first) for facets in mesh.sides.values()), ("triangle", mesh.cells + first)]
+        of, first = [*of, *mesh.sides, body], first + len(mesh.points)
+    number = {name: tag for tag, name in enumerate(dict.fromkeys(of), 1)}
+    tags = [np.full(len(cells), number[name]) for name, (_, cells) in zip(of, blocks, strict=True)]
     written = meshio.Mesh(
-        np.pad(points, ((0, 0), (0, 1))),
-        [("line", np.concatenate(list(sides.values()))), ("triangle", mesh.cells)],
-        cell_data={"gmsh:physical": groups, "gmsh:geometrical": groups},
-        field_data={name: np.array([tag, 1]) for tag, name in enumerate(sides, 1)},
+        np.pad(np.concatenate([mesh.points for mesh in bodies.values()]), ((0, 0), (0, 1))),
+        blocks,
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+        field_data={name: np.array([tag, 1 + (name in bodies)]) for name, tag in number.items()},
     )
     meshio.write(path, written, file_format="gmsh22", binary=False)

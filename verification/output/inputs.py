@@ -8,6 +8,7 @@ import numpy as np
 
 from verification.algorithm.runs import run
 from verification.interface.pair import pair_from
+from verification.ledger.cases import write
 from verification.output.files import check_folder, staged
 from verification.problem.examples import example, examples
 from verification.problem.tables import ProblemError
@@ -17,6 +18,7 @@ INPUTS = {
     "my.toml": "the plates of Section 6",
     "history.toml": "two plates with a loading history",
     "grid.toml": "a sweep of my.toml over theta and friction",
+    "model.msh": "the meshes of both plates of my.toml",
     "S1.npy": "interface matrix of the lower plate of my.toml",
     "S2.npy": "interface matrix of the upper one",
     "convergence.log": "residuals of a run of my.toml with theta = 0.5 and no friction, as preCICE writes them",
@@ -56,6 +58,7 @@ def write_inputs(folder: Path) -> None:
             (room / name).write_text(text.rstrip() + "\n", encoding="utf-8")
         for name, array in arrays.items():
             np.save(room / name, array)
+        write(room / "model.msh", lower=pair.body1.loaded_body.mesh, upper=pair.body2.loaded_body.mesh)
         for name in INPUTS:
             there = folder / name
             if there.exists() and there.read_bytes() != (room / name).read_bytes():
