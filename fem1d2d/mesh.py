@@ -61,7 +61,8 @@ class Mesh(Cells):
     cut : str
         Cells of a file that were cut into these, in words.
     shares : mapping from text to bool
-        The named surfaces of a file of which it takes a group, as ``wing of both.msh``: True if it has cells of them.
+        The named surfaces of a file of which it takes a group, by names such as ``wing of both.msh``: True if it has
+        cells of them.
     off : mapping from name to str
         Named lines of a file that are no edges of the boundary, and no sides: where they are, in words.
     centres : int array, shape (q,)

@@ -95,7 +95,7 @@ def schema(name: str) -> JsonSchema:
     Parameters
     ----------
     name : str
-        Name of the document, as ``run``, or what the document has under ``schema``, as ``ndtheory.run/1``.
+        Name of the document, such as ``run``, or what the document has under ``schema``, such as ``ndtheory.run/1``.
 
     Returns
     -------

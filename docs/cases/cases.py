@@ -344,7 +344,12 @@ def table() -> str:
         steps = "-" if case.steps is None else case.steps
         for i, row in enumerate(case.rows):
             exact = row.difference < 1e-9
-            values = [row.quantity, f"{row.known:.5g}", f"{row.ours:.5g}", "0" if exact else f"{row.difference:.2%}"]
+            values = [
+                row.quantity,
+                f"{row.known:.5g}",
+                f"{row.ours:.5g}",
+                "0" if exact else f"{100 * row.difference:.2f} %",
+            ]
             title, source, count = (f"{{ref}}`gallery-{name}`", case.source, steps) if i == 0 else ("", "", "")
             lines.append(f"| {' | '.join(map(str, [title, *values, source, count]))} |")
     return "\n".join(lines)

@@ -3,11 +3,13 @@
 import re
 import shlex
 import tomllib
+from typing import get_args
 
 import pytest
 
 import ndtheory
 from verification import comparison, registry
+from verification.bounds.verdicts import RunVerdict
 from verification.cli.problems import examples
 from verification.registry import BOUNDS
 from verification.show.layout import lines as shown
@@ -124,6 +126,7 @@ def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monke
     assert lines[-1].startswith("Next: ndtheory ")
     assert len(lines) <= 46
     assert [line for line in lines if len(line) > 80] == []
+    assert not {*get_args(RunVerdict)} & set(re.findall(r"\w+", answer.out))  # the names of documents
     for result in kept:
         short = [line for line, _ in shown(registry.screen(result), "terminal")]
         assert len(short) <= 15
@@ -143,6 +146,7 @@ def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, name):
     answer = call("advise", built_in(name))
     lines = answer.out.splitlines()
     assert (answer.status, answer.err) == (0, "")
+    assert lines[0]  # no empty line first
     asked = [head for head in HEADINGS["advise"] if "FRICTION" not in head or name not in ("signorini", "two-bars")]
     assert [line for line in lines if line in HEADINGS["advise"]] == asked
     assert lines[-1].startswith("Next: ndtheory run ")

@@ -38,9 +38,7 @@ def test_the_document_and_the_report_say_what_was_not_asked_for(call, write, tmp
     ],
 )
 def test_what_is_no_bound_is_one_line(call, write, names, says):
-    assert call("compare", write(), "--bounds", names).complaint == (
-        f"ndtheory compare: Invalid value for '--bounds': {says}"
-    )
+    assert call("compare", write(), "--bounds", names).complaint == (f"ndtheory compare: --bounds = {names}: {says}")
 
 
 def test_nothing_can_be_exact_where_no_bound_can_be_brought_closer(call, write):

@@ -2,8 +2,10 @@
 
 import csv
 import json
+import re
 import signal
 import xml.etree.ElementTree as ET
+from typing import get_args
 
 import meshio
 import pytest
@@ -11,6 +13,7 @@ from histories import PATH, pressed_and_sheared
 
 import verification as vf
 from verification.algorithm import history
+from verification.bounds.verdicts import RunVerdict
 from verification.output import files
 
 
@@ -58,6 +61,8 @@ def test_the_screen_has_a_row_for_each_step_and_what_the_theorem_says(call, path
     assert "at most" in answer.out
     assert max(len(line) for line in answer.out.splitlines() if str(path) not in line) <= 80
     assert "0/0/7" in answer.out
+    assert re.search(r"  energy  .*\d consistent", answer.out)
+    assert not {*get_args(RunVerdict)} & set(re.findall(r"\w+", answer.out))
 
 
 def test_both_methods_give_the_same_forces(call, path, document):

@@ -5,6 +5,7 @@ import shlex
 import pytest
 
 import verification as vf
+from ndtheory.statements import statements
 
 SMALL = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}
 SETS = ("--set", "contact.friction=0.3", "--set", "body1.y=[-0.4, 0]", "--set", 'title="a b"')
@@ -36,6 +37,19 @@ def test_a_comparison_is_suggested_with_the_theta_the_rule_and_the_roles_of_the_
     words = suggested(call("run", file, *options))
     assert words == ["compare", str(file), *options]
     assert call(*words, "--json").document["problem"] == run
+
+
+@pytest.mark.parametrize(
+    ("given", "about"),
+    [
+        ("--rho 0.475", ["x-energy"]),
+        ("--m 1 --M 2 --CR 1 --CK 0", ["thm-5.9"]),
+        ("--m 1 --M 2 --CR 1 --CK 0 --rho 2", ["thm-5.9", "x-energy"]),
+    ],
+)
+def test_the_calculator_leads_to_the_theorems_that_its_constants_enter(call, given, about):
+    assert suggested(call("bounds", *given.split())) == ["verify", *about]
+    assert {*about} <= statements().keys()
 
 
 def test_a_history_whose_files_are_written_leads_to_its_page(call, quick, write, tmp_path):

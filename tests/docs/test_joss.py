@@ -65,7 +65,7 @@ def test_the_numbers_of_the_paper_are_those_of_the_screen_that_is_explained():
         digits = re.sub(r" \\cdot 10\^\{(-\d+)\}", r"e\1", shown)
         assert float(digits) == pytest.approx(value, rel=0.01)
         assert f"${shown}$" in TEXT or shown in TEXT
-    assert re.search(r"reach a factor of [\d.]+, ([\d.]+)% less", screen)[1] in TEXT
+    assert re.search(r"reach a factor of [\d.]+, ([\d.]+) % less", screen)[1] in TEXT
     readme = " ".join((ROOT / "README.md").read_text("utf-8").split())
     assert [
         count for count in re.findall(r"(\d+)\nstatements|and (\d+) of our", TEXT) if f"{''.join(count)} " not in readme

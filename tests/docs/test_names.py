@@ -53,6 +53,19 @@ def test_what_docstrings_refer_to_exists():
     assert {name: names for name, names in found.items() if names} == {}
 
 
+def test_a_page_that_a_source_or_a_built_in_file_names_exists_and_has_the_title_that_is_given():
+    root, titles = Path(vf.__file__).parents[1], 0
+    sources = [path for top in ("fem1d2d", "ndtheory", "verification") for path in (root / top).rglob("*.*")]
+    for path in sources:
+        text = path.read_text("utf-8") if path.suffix in (".py", ".toml", ".js", ".j2") else ""
+        for page, title in re.findall(r'(docs/[\w/]+\.md)(?: \("([^"]+)"\))?', text):
+            first = next(line for line in (root / page).read_text("utf-8").splitlines() if line.startswith("# "))
+            assert title in ("", first[2:])
+            titles += bool(title)
+        assert not re.search(r'\bpage "', text), f"{path}: the title of a page without its file"
+    assert titles
+
+
 def test_a_reference_to_nothing_is_found():
     text = '"""See :func:`ndtheory.bounds.evaluate`, :mod:`verification.jacobian`, :class:`Bounds`, :func:`small`."""'
     assert missing("ndtheory.bounds", text) == ["verification.jacobian", "small"]

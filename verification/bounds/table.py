@@ -177,7 +177,7 @@ def _why_not(
     scale = threshold.value if threshold is not None else float("inf")
     if varies:
         return f"needed less than {scale / friction:.2g} times the friction along Gamma_c"
-    return f"friction {friction:g} is not below {scale:.2g}"
+    return f"friction {friction:g} {'is at' if friction == scale else 'exceeds'} its limit {scale:.2g}"
 
 
 BOUNDS.provide(Printed(), Repaired(), Energy())

@@ -47,14 +47,14 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     elif found.lower is not None:
         gap = float(found.factor) / found.lower - 1
         claim.append(
-            f"Proved factor {few(6)}, attained {found.lower:.6g} by two forces (in doubles): {max(gap, 0.0):.2%} apart."
-            "  No proof can give less than the attained factor."
+            f"Proved factor {few(6)}, attained {found.lower:.6g} by two forces (in doubles):"
+            f" {100 * max(gap, 0.0):.2f} % apart.  No proof can give less than the attained factor."
         )
     sets = "" if found.sets == 1 else f"The pieces of T are divided into {found.sets} sets, each with its own form.  "
     proposed = registry.BOUNDS[found.edition].words
     proof = (
-        f"{sets}Multipliers proposed by {proposed}; with them the quadratic form of the proof is"
-        f" positive definite for the rational data of the problem, in balls of {found.claim['bits']} bits."
+        f"{sets}{proposed.capitalize()} proposes multipliers.  With them the quadratic form of the proof is positive"
+        f" definite for the exact rational data, which {found.claim['bits']}-bit interval arithmetic proves."
     )
     then = following("certify", "-o", "certificate.json", iteration=True)
     about = f"{found.problem.title}: {nodes} nodes, {len(discrete['weights'])} contact nodes"

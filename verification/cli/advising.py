@@ -15,7 +15,7 @@ from ndtheory import HypothesisError, exact
 from ndtheory.texts import did_you_mean
 from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import AdviseCommand, AdviseGroup, Default, cli
-from verification.cli.options import JSON, SET, SWAP, F, OneOf, Typed
+from verification.cli.options import JSON, PATH, SET, SWAP, F, OneOf, Typed
 from verification.cli.problems import load_problem
 from verification.coupling.kinds import Kind, KindName, kind_of
 from verification.coupling.snippets import SNIPPETS
@@ -116,7 +116,7 @@ def _words(context: click.Context, parameter: click.Parameter, begun: str) -> li
 
 
 @click.command("advise", cls=Default)
-@click.argument("file", type=click.Path(path_type=Path), shell_complete=_words)
+@click.argument("file", type=PATH, shell_complete=_words)
 @SET
 @SWAP
 @TIED
@@ -169,7 +169,7 @@ def _number(needed: str, fits: Callable[[Fraction], bool]) -> Callable[..., str 
         except (ValueError, OverflowError):
             good = False
         if not good:
-            raise click.UsageError(f"--{parameter.name} = {value}: needed {needed}")
+            raise click.BadParameter(f"{value}: needed {needed}")
         return value
 
     return read
@@ -177,7 +177,7 @@ def _number(needed: str, fits: Callable[[Fraction], bool]) -> Callable[..., str 
 
 def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callable[[F], F]:
     """An option that names a file with a matrix."""
-    return click.option(option, parameter, type=click.Path(path_type=Path), metavar="MATRIX", help=words, **settings)
+    return click.option(option, parameter, type=PATH, metavar="MATRIX", help=words, **settings)
 
 
 @click.command(cls=AdviseCommand)
@@ -191,7 +191,7 @@ def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callabl
 @click.option(
     "--friction",
     metavar="K",
-    callback=_number("a number >= 0, as --friction 0.2", lambda k: k >= 0),
+    callback=_number("a number >= 0, such as --friction 0.2", lambda k: k >= 0),
     help="Friction k >= 0, with --x and --radius, or with --kernel and --weights or --x.",
 )
 @_matrix("--x", "x", "Positions of the nodes of the contact body, increasing.")
@@ -235,9 +235,9 @@ def matrices(kind: Kind, snippets: str | None, as_json: bool, **given: Any) -> N
     "--log",
     "logs",
     metavar="FILE",
-    type=click.Path(path_type=Path),
+    type=PATH,
     multiple=True,
-    help="Convergence log, as precice-Solid-convergence.log; may be repeated with its --theta.",
+    help="Convergence log, such as precice-Solid-convergence.log; may be repeated with its --theta.",
 )
 @click.option(
     "--theta",
@@ -261,8 +261,8 @@ def matrices(kind: Kind, snippets: str | None, as_json: bool, **given: Any) -> N
     help="Regular expression for the lines of another log: its one group is the residual, or its groups are named "
     "residual, iteration, theta and omega (of Aitken).",
 )
-@click.option("--format", "name", metavar="NAME", help="Format of the logs if it is not recognised, as SU2.")
-@click.option("--log10", is_flag=True, help="The residuals are decimal logarithms, as of SU2.")
+@click.option("--format", "name", metavar="NAME", help="Format of the logs if it is not recognised, such as SU2.")
+@click.option("--log10", is_flag=True, help="The residuals are decimal logarithms, as those of SU2 are.")
 @click.option("--friction", is_flag=True, help="There is friction; the answer has bounds and the next run.")
 @of_kind
 @SNIPPETS_OF
@@ -368,13 +368,13 @@ def _shape(context: click.Context, parameter: click.Parameter, value: str | None
     for word in value.split(",") if value else ():
         if word not in SHAPES:
             needed = f"some of {', '.join(SHAPES)}{did_you_mean(word, SHAPES)}"
-            raise click.UsageError(f"--shape = {word}: needed {needed}")
+            raise click.BadParameter(f"{word}: needed {needed}")
         key, meant = SHAPES[word]
         if found.get(key, meant) != meant and key != "mirror":
-            raise click.UsageError(f"--shape = {value}: needed one {key}, received two")
+            raise click.BadParameter(f"{value}: needed one {key}, received two")
         found[key] = [*found.get(key, ()), meant] if key == "mirror" else meant
     if found.get("flat") and "mirror" not in found:
-        raise click.UsageError(f"--shape = {value}: needed mirror-1 or mirror-2 with flat")
+        raise click.BadParameter(f"{value}: needed mirror-1 or mirror-2 with flat")
     return found
 
 
@@ -448,8 +448,8 @@ def moduli(shape: dict[str, Any], kind: Kind, as_json: bool, **given: str | None
 
 
 @click.command(cls=AdviseCommand)
-@click.argument("iterates", metavar="X", type=click.Path(path_type=Path))
-@click.argument("images", metavar="TX", type=click.Path(path_type=Path), required=False)
+@click.argument("iterates", metavar="X", type=PATH)
+@click.argument("images", metavar="TX", type=PATH, required=False)
 @of_kind
 @SNIPPETS_OF
 @JSON

@@ -11,7 +11,7 @@ import click
 
 from verification.cli.console import deliver, fail, stages
 from verification.cli.forms import cli
-from verification.cli.options import JSON, PATH, SET, SWAP, THETA, Registered, Typed, one_file
+from verification.cli.options import JSON, PATH, SET, SWAP, THETA, OneOf, Registered, Typed, one_file
 from verification.cli.problems import load
 from verification.show.parts import Sections
 
@@ -34,7 +34,7 @@ def _editions() -> Sequence[str]:
 @click.option("--edition", type=Registered(_editions), help="Bound that proposes the factor; the strongest by default.")
 @click.option(
     "--norm",
-    type=click.Choice(["energy", "lyapunov"]),
+    type=OneOf(["energy", "lyapunov"]),
     default="energy",
     help="Norm of the claim: energy is the norm (5.21), lyapunov is one that the proof chooses.",
 )

@@ -21,7 +21,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
 def schema(name: str | None) -> None:
     """List the documents of all commands, or print one JSON Schema.
 
-    NAME is the name of a document, as run, or its key "schema", as ndtheory.run/1.
+    NAME is the name of a document, such as run, or its key "schema", such as ndtheory.run/1.
 
     \b
     Example:

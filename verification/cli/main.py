@@ -109,8 +109,10 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
     except click.UsageError as error:
         from verification.problem.tables import short
 
-        where = error.ctx.command_path if error.ctx else "ndtheory"
-        complain(f"{where}: {short(printable(' '.join(error.format_message().split())), 600)}")
+        where, said = error.ctx.command_path if error.ctx else "ndtheory", error.format_message()
+        if type(error) is click.BadParameter and error.param is not None:
+            said = f"{error.param.opts[0]} = {error.message}"
+        complain(f"{where}: {short(printable(' '.join(said.split())), 600)}")
         return BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         complain(interruption())

@@ -30,7 +30,7 @@ def _pairs(context: click.Context, parameter: click.Parameter, given: Sequence[s
     for words in given:
         key, equals, value = words.partition("=")
         if not equals:
-            needed = f"{words!r}: needed KEY=VALUE, as contact.friction=0.4"
+            needed = f"{words}: needed KEY=VALUE, such as contact.friction=0.4"
             raise click.BadParameter(needed)
         pairs.pop(key, None)  # the last one is set last
         pairs[key] = value
@@ -43,7 +43,7 @@ SET = click.option(
     multiple=True,
     callback=_pairs,
     metavar="KEY=VALUE",
-    help="Set a key of FILE, as contact.friction=0.4 or 'body1.x=[0, 3]'; may be repeated.",
+    help="Set a key of FILE, such as contact.friction=0.4 or 'body1.x=[0, 3]'; may be repeated.",
 )
 
 
@@ -51,9 +51,20 @@ class OneOf(click.Choice[str]):
     """A word of a list; the error for another word has the list and the word that may be meant."""
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
-        """The list, and the word that resembles the value."""
-        said = super().get_invalid_choice_message(value, ctx).rstrip(".")
-        return said + did_you_mean(str(value), self.choices)
+        """The value, the list, and the word that resembles the value."""
+        return f"{value}: needed one of {', '.join(self.choices)}{did_you_mean(str(value), self.choices)}"
+
+
+class Whole(click.IntRange):
+    """A whole number of a range; the error for another value has the range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            limits = f"of at least {self.min}" if self.max is None else f"from {self.min} to {self.max}"
+            raise click.BadParameter(f"{value}: needed a whole number {limits}") from None
 
 
 class Registered(OneOf):
@@ -90,7 +101,7 @@ def _bounds(context: click.Context, parameter: click.Parameter, value: str | Non
     try:
         return None if value is None else chosen(value)
     except ValueError as error:
-        raise click.BadParameter(str(error)) from None
+        raise click.BadParameter(f"{value}: {error}") from None
 
 
 BOUNDS = click.option(
@@ -143,7 +154,7 @@ def one_file(
         if value is None or context.resilient_parsing:
             return value
         if value.suffix not in endings:
-            raise click.BadParameter(f"{str(value)!r}: needed {needed}")
+            raise click.BadParameter(f"{value}: needed {needed}")
         from verification.output.files import check_ours
         from verification.problem.tables import ProblemError
 
@@ -165,9 +176,7 @@ def one_file(
 
 FOLDER = click.option("-o", "--output", "folder", callback=folder_name, metavar="DIR", help="Folder for the results.")
 
-JOBS = click.option(
-    "--jobs", type=click.IntRange(1), metavar="N", help="Number of processes; one for each core by default."
-)
+JOBS = click.option("--jobs", type=Whole(1), metavar="N", help="Number of processes; one for each core by default.")
 STORE = click.option("--store", type=PATH, metavar="STORE", help="File that keeps the rows of runs (SQLite).")
 
 

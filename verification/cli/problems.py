@@ -17,7 +17,20 @@ import click
 from ndtheory.keys import key
 from verification.cli.console import complain, deliver, one_by_one, progress, remember, say, stages, warn
 from verification.cli.forms import cli
-from verification.cli.options import BOUNDS, FOLDER, FULL, JSON, PATH, RUN, SWAP, Typed, folder_name, of_a_file, writer
+from verification.cli.options import (
+    BOUNDS,
+    FOLDER,
+    FULL,
+    JSON,
+    PATH,
+    RUN,
+    SWAP,
+    Typed,
+    Whole,
+    folder_name,
+    of_a_file,
+    writer,
+)
 from verification.document import Document
 
 if TYPE_CHECKING:
@@ -128,7 +141,7 @@ def load(typed: Typed) -> Problem:
 
 @cli.command()
 @of_a_file(SWAP)
-@click.option("--refine", type=click.IntRange(0, 8), default=0, metavar="N", help="Halve the mesh up to N times, too.")
+@click.option("--refine", type=Whole(0, 8), default=0, metavar="N", help="Also measure on meshes halved 1 to N times.")
 @click.option("--verified", is_flag=True, help="Prove bounds of each constant, for the exact data of FILE on its mesh.")
 @JSON
 def constants(typed: Typed, refine: int, verified: bool, as_json: bool) -> None:

@@ -34,14 +34,14 @@ def _axes(context: click.Context, parameter: click.Parameter, given: tuple[str, 
         unknown = [name for name in names if name not in (*GIVEN, *RESULTS)]
         if unknown or len(names) not in (2, 3):
             needed = f"needed X,Y or X,Y,CURVES with columns of {', '.join((*GIVEN, *RESULTS))}"
-            raise click.BadParameter(f"{words!r}: {needed}")
+            raise click.BadParameter(f"{words}: {needed}")
     return plots
 
 
 @cli.command()
 @FILE
 @JOBS
-@click.option("--dask", metavar="ADDRESS", help="Run on the workers of this dask scheduler, as tcp://host:8786.")
+@click.option("--dask", metavar="ADDRESS", help="Run on the workers of this dask scheduler, such as tcp://host:8786.")
 @STORE
 @click.option("--fresh", is_flag=True, help="Make all rows again, those in the store too.")
 @click.option("--retry", is_flag=True, help="Make those rows of the store again that ended in an error.")

@@ -145,13 +145,13 @@ nd.onPage("explore", (figure) => {
     const map = new nd.Chart({ width: 360, height: 260, label: "The runs over theta and friction",
       x: { low: 0, high: 1, name: "theta" }, y: { low: -0.06 * (most || 1), high: 1.06 * (most || 1), name: "friction k" } });
     panel("All runs: theta and friction", map.root, nd.html("p", { class: "legend" },
-      "Circle: converged, the larger the fewer steps; cross: not. Filled region: by a bound one step contracts; the printed one is not proved."));
+      "Circle: the run converged; larger circles took fewer steps. Cross: it did not. Shaded: a bound proves that one step contracts; the printed bound only claims it."));
     const factors = new nd.Chart({ width: 360, height: 260, label: "Error per step over theta", x: { low: 0, high: 1, name: "theta" }, y: { low: 0, high: 1.5, name: "error per step" } });
     panel("Error per step at this friction", factors.root, nd.html("p", { class: "legend" },
       "Points: observed, of runs that converged. Dashed: predicted from rho, not a bound; its least value is marked. Line: bound in energy norms, in doubles, where it applies."));
     const ruler = new nd.Chart({ width: 360, height: 170, label: "Steps promised, predicted and taken", x: { low: 1, high: 1e4, log: true, name: `steps to ${short(data.tolerance)}` }, y: { low: 0, high: 4, bare: true, name: "" } });
     panel("How many steps?", ruler.root, nd.html("p", { class: "legend" },
-      "By the best bound at most so many, whatever the loads; as rho predicts them, without friction; as this run took them."));
+      "Green: the most steps the best bound allows, for any loads. Orange: steps predicted from rho, without friction. Blue: steps this run took."));
 
     function drawResiduals(run, i) {
       const seen = run.residuals.filter((r) => r > 0), low = Math.min(data.tolerance / 10, ...seen), high = Math.max(1, ...seen) * 2;

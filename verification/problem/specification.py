@@ -165,7 +165,7 @@ class Problem(ProblemSpec):
         return {"s": s, "k": [function(float(at)) for at in s]}
 
     def with_keys(self, values: Mapping[str, Any]) -> Problem:
-        """Return the problem with keys of its file set, as ``{"contact.friction": "0.4", "body1.cells": "[40, 6]"}``.
+        """Return the problem with keys of its file set: ``{"contact.friction": "0.4", "body1.cells": "[40, 6]"}``.
 
         Parameters
         ----------
@@ -253,7 +253,7 @@ class Problem(ProblemSpec):
 
 def _key(name: str, source: str) -> Key:
     """Split ``body2.prescribed.top`` into its parts; TOML reads it, so that a part may be quoted."""
-    refused = ProblemError(source, name or QUOTED, None, "needed the name of a key, as contact.friction")
+    refused = ProblemError(source, name or QUOTED, None, "needed the name of a key, such as contact.friction")
     try:
         found: Any = tomllib.loads(f'{name} = "{_HERE}"') if name.isprintable() else None
     except (tomllib.TOMLDecodeError, RecursionError):

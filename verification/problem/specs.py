@@ -185,16 +185,19 @@ class Loads(Entries):
     """Loads of a body, or those that a step of a loading history names: without a body force it keeps its value."""
 
     prescribed: Mapping[str, Components] = entry(
-        'sides with a given displacement, as `{ top = [0.0, -0.015] }`; `"free"` leaves a component free',
+        'sides with a given displacement, such as `{ top = [0.0, -0.015] }`; `"free"` leaves a component free',
         unit="length",
         reader=lambda value, at: readers.by_side(value, at, free=True),
         **_ON_SIDES,
     )
     traction: Mapping[str, tuple[Fraction, ...]] = entry(
-        "force per area on sides, as `{ right = [0.0, -60.0] }`", unit="stress", reader=readers.by_side, **_ON_SIDES
+        "force per area on sides, such as `{ right = [0.0, -60.0] }`",
+        unit="stress",
+        reader=readers.by_side,
+        **_ON_SIDES,
     )
     body_force: tuple[Fraction, ...] = entry(
-        "force per volume, as `[0.0, -1.0]`",
+        "force per volume, such as `[0.0, -1.0]`",
         None,
         lambda at: at["kept"],
         "stress/length",
@@ -204,8 +207,8 @@ class Loads(Entries):
         **_LOAD,
     )
     point_load: Mapping[tuple[Fraction, ...], tuple[Fraction, ...]] = entry(
-        "forces at points, as `[{ at = [1.0, 0.3], force = [0.0, -60.0] }]`: each acts on the nearest node of the body,"
-        " at most half an edge away",
+        "forces at points, such as `[{ at = [1.0, 0.3], force = [0.0, -60.0] }]`: each acts on the nearest node of the"
+        " body, at most half an edge away",
         unit="stress · length",
         reader=readers.forces_at,
         default=ReadOnly(),
@@ -257,8 +260,8 @@ class BodySpec(Loads):
     part = "Body"
 
     shape: Literal["rectangle", "interval", "mesh", "rigid", "union"] = entry(
-        '`"rectangle"`, in one dimension `"interval"`; `"rigid"` makes the body an obstacle, for `solve` and, with the'
-        " Neumann problem, for `run`",
+        '`"rectangle"`, in one dimension `"interval"`; `"rigid"` makes the body an obstacle. `solve` always'
+        " accepts it; `run` only if it has the Neumann problem",
         reader=lambda value, at: choice("interval" if at["dimension"] == 1 else "rectangle", "rigid")(value),
         only=_drawn,
         initial="mesh",
@@ -324,8 +327,8 @@ class BodySpec(Loads):
         counts=lambda mesh: mesh and mesh.sha256,
     )
     group: tuple[str, ...] = entry(
-        'the named surfaces (`Physical Surface` of Gmsh, element sets of Abaqus) that make this body, as `"left"` or '
-        '`["left", "wing"]`, where a mesh file holds several bodies',
+        'the named surfaces (`Physical Surface` of Gmsh, element sets of Abaqus) that make this body, such as `"left"` '
+        'or `["left", "wing"]`, where a mesh file holds several bodies',
         readers.groups,
         (),
         initial=(),
@@ -354,22 +357,23 @@ class BodySpec(Loads):
         absent="of an obstacle and in one dimension",
     )
     parts: Mapping[str, SidePart] = entry(
-        'named parts of sides, as `{ pressed = { side = "top", x = [0.0, 0.8] } }`: the edges of that side between two'
-        " positions along x or y; `fixed`, `prescribed`, `traction` take the name",
+        'parts of sides by name, such as `{ pressed = { side = "top", x = [0.0, 0.8] } }`: the edges of that side'
+        " between two positions along x or y; `fixed`, `prescribed`, `traction` take the name",
         reader=_parts,
         default=EMPTY,
         initial=ReadOnly(),
         only=_elastic,
     )
     fixed: tuple[str, ...] = entry(
-        'sides with $u = 0$, as `["bottom"]`',
+        'sides with $u = 0$, such as `["bottom"]`',
         reader=readers.side_list,
         default=(),
         only=_elastic,
         counts=lambda sides: tuple(sorted(sides)),
     )
     points: Mapping[str, tuple[Fraction, ...]] = entry(
-        "points of the body, as `{ tip = [0.0, 1.0] }`: `run`, `solve` and `march` give displacement and stress there",
+        "points of the body, such as `{ tip = [0.0, 1.0] }`: `run`, `solve` and `march` give displacement and stress"
+        " there",
         unit="length",
         reader=readers.by_name,
         default=EMPTY,
@@ -575,8 +579,8 @@ class Settings(Entries):
         type="exact",
     )
     max_iterations: int = entry(
-        "the run ends after so many steps. Every iterate is kept, so there is a largest number: they may fill 2 GB,"
-        " which is 624,000 steps at 25 contact nodes",
+        "the run ends after so many steps. The largest value is limited, because every iterate is kept and may fill"
+        " 2 GB, which is 624,000 steps at 25 contact nodes",
         readers.at_least_one,
         500,
         "1",
@@ -599,7 +603,7 @@ class IterationSpec(Settings):
     )
     neumann_bodies: tuple[int, ...] = entry(
         "with tables `[[contact]]`, instead of `neumann_body`: the numbers of all bodies with the linear problem of"
-        " step I, as `[1, 3]`",
+        " step I, such as `[1, 3]`",
         reader=readers.roles,
         default=lambda at: at["chosen"],
         initial=(),

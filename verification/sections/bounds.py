@@ -95,16 +95,13 @@ def sections(found: Calculated) -> Sections:
     details = {name: result.detail for name, result in found.results.items()}
     section_5 = {name: detail for name, detail in details.items() if isinstance(detail, Bounds)}
     unproved = not all(detail.proved for detail in section_5.values())
+    ids = [id for id, given in (("thm-5.9", found.constants), ("x-energy", found.energy)) if given is not None]
     return (
         section("setting", "", *map(Facts, facts)),
         contracts(list(found.results.values()), "the unit of --m"),
         *([_derived(section_5)] if section_5 else []),
         *thetas(details.values()),
-        closing(
-            "",
-            *([Note(on_the_printed_proof(), 0)] if unproved else []),
-            then="ndtheory example section6 > ex.toml; ndtheory constants ex.toml",
-        ),
+        closing("", *([Note(on_the_printed_proof(), 0)] if unproved else []), then=f"ndtheory verify {' '.join(ids)}"),
     )
 
 

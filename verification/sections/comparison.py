@@ -196,8 +196,7 @@ def proofs(result: Comparison) -> Sections:
         rows.append((name, says, factor(bound.factor, bound.one_minus_factor), _most(steps), WORDS[verdict.verdict]))
     parts: list[Shown] = []
     for words, names in without.items():
-        too = f"; {', '.join(names[:-1])} too" * (len(names) > 1)
-        why = f"{names[-1]}: {result.verdicts[names[-1]].reason}{too}"  # each has another reason
+        why = f"{'; '.join(names)}: {result.verdicts[names[-1]].reason}"  # each has another reason
         parts.append(Labelled(words, ", ".join(names) if result.run.outside else why))
     wrong = {n: j.reason for n, j in result.verdicts.items() if j.verdict == "VIOLATED"}
     parts += [Labelled(NAMES[n], f"violated: {wrong[n]}") for n in wrong.keys() & NAMES]

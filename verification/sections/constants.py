@@ -64,19 +64,19 @@ def sections(measured: Measured) -> Sections:
     if any(number is not None and number.level == "verified" for number in numbers):
         ends = "verified: between two bounds proved for the exact data of the file on this mesh, rounding included."
     else:
-        ends = "For this mesh: no discretisation error, but rounding. For theta only rho_max matters."
+        ends = "These numbers hold for this mesh, up to rounding. Only rho_max affects the choice of theta."
     for reason in dict.fromkeys(measured.reason.values()):
         names = ", ".join(name for name, why in measured.reason.items() if why == reason)
         parts.append(Note(f"{names}: {reason}"))
     mesh = "On a mesh m is above and M below its continuous value"
-    unsafe = "for the continuous theorem both err on the unsafe side"
+    unsafe = "For the continuous problem both make the theorem look better than it is."
     then = following("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
     title = "WHICH CONSTANTS DOES THE THEOREM USE?"
     caption = "The constants on this mesh: first Section 5, then rho and the theorem in energy norms."
     return (
         setting(problem, measured.nodes, measured.interface_nodes, measured.cuts),
         section("all constants", title, *parts, caption=caption),
-        closing("", Note(ends, 0), Note(f"{mesh}: {unsafe}.", 0), then=then),
+        closing("", Note(ends, 0), Note(f"{mesh}. {unsafe}", 0), then=then),
     )
 
 
@@ -86,7 +86,8 @@ def _cells(measured: Measured) -> Note:
     if rho is None or rho_normal is None:
         return Note(f"rho_cells, rho_normal_cells: {measured.why_no_cells}")
     both = f"rho_cells = {figures(rho, 5)}, rho_normal_cells = {figures(rho_normal, 5)}"
-    return Note(f"{both}: half-planes of these cells, once halved; limits on finer such meshes are at least these")
+    where = "computed for half-planes of the file's cells, halved once"
+    return Note(f"{both}, {where}. On finer meshes rho tends to at least these values.")
 
 
 def compared(measured: Measured) -> Section:

@@ -7,6 +7,7 @@ from itertools import groupby
 
 from verification import registry
 from verification.algorithm.history import History
+from verification.sections.comparison import WORDS
 from verification.sections.run import AT_POINTS, counted, point_rows, then, unfinished
 from verification.sections.setting import limits, setting
 from verification.show.numbers import NONE, count, figures, near_one
@@ -100,7 +101,7 @@ def _promised(found: History) -> Iterable[Shown | str]:
     rows = []
     for name, bound in found.bounds.items():
         judged = [each.verdicts[name].verdict for each in found.increments]
-        said = ", ".join(f"{judged.count(verdict)} {verdict}" for verdict in dict.fromkeys(judged))
+        said = ", ".join(f"{judged.count(verdict)} {WORDS[verdict]}" for verdict in dict.fromkeys(judged))
         rows.append((name, NONE if bound.factor is None else near_one(bound.factor.value), said))
     yield table(("bound", "factor", "increments"), rows)
     promised = [each.promise.steps for each in found.increments if each.promise is not None and each.promise.steps]

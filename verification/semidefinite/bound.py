@@ -97,7 +97,7 @@ class SemidefiniteBound(Bound):
         found = None if result is None else result.detail
         if found is None:
             return ()
-        said = [f"{self.name}: some loads reach a factor of {found.lower:.3f}, {found.gap:.2%} less"]
+        said = [f"{self.name}: some loads reach a factor of {found.lower:.3f}, {100 * found.gap:.2f} % less"]
         if found.divided is not None:
             divided = f"dividing the pieces of T gives {found.divided.value:#.4g} in doubles"
             said.append(f"{self.name}: proved is the factor of one program; {divided}")

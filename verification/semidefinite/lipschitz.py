@@ -160,7 +160,9 @@ def enclose(
             if programs is not None and solved + len(parts) > programs:
                 break
             stop = Stop(accuracy=gap / 100, enough=((1 + gap) * lower) ** 2 * (1 - SAME_BOUND))
-            progress(f"semidefinite bound: {worst.upper.value / lower - 1:.2%} above a factor that occurs", None)
+            progress(
+                f"semidefinite bound: {100 * (worst.upper.value / lower - 1):.2f} % above a factor that occurs", None
+            )
             heapq.heappop(leaves)
             divisions[worst.pieces.key] = division
             for part in parts:

@@ -30,7 +30,7 @@ def lines(
     """
     for section in shown(sections, place):
         if section.id != after:
-            if after or section.title:
+            if after:
                 yield "", False
             title = textwrap.wrap(section.title, WIDTH, subsequent_indent="  ")
             yield from ((line, True) for line in title)

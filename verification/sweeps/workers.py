@@ -284,7 +284,7 @@ def _ask(address: str) -> None:
     asking.start()
     asking.join()
     if wrong:
-        needed = "needed the address of a dask scheduler that answers, as tcp://host:8786"
+        needed = "needed the address of a dask scheduler that answers, such as tcp://host:8786"
         raise ProblemError("--dask", "address", address, f"{needed} ({wrong[0]})")
 
 

@@ -306,7 +306,7 @@ def test_a_kind_of_result_without_sections_is_shown_as_its_document_and_may_regi
     assert Weather().sections() == ()
     assert "test.weather/1" in Weather()._repr_html_()
     registry.sections.register(Storm, lambda found: (section("sky", "HOW IS THE SKY?", found.schema),))
-    assert text(Storm().sections()) == "\nHOW IS THE SKY?\n  test.weather/1"
+    assert text(Storm().sections()) == "HOW IS THE SKY?\n  test.weather/1"
 
 
 # --- parts ---
@@ -328,7 +328,7 @@ def test_what_is_for_one_place_is_shown_there_alone():
     assert [part.text for each in shown(sections, "report") for part in each.parts] == [
         "everywhere", "of a page", "last",
     ]  # fmt: skip
-    assert [line for line, _ in lines(sections, "terminal")] == ["", "A", "  everywhere", "  of a screen"]
+    assert [line for line, _ in lines(sections, "terminal")] == ["A", "  everywhere", "  of a screen"]
     assert text(sections) == "\nA\n  everywhere"
 
 
