@@ -329,7 +329,7 @@ def test_what_is_for_one_place_is_shown_there_alone():
         "everywhere", "of a page", "last",
     ]  # fmt: skip
     assert [line for line, _ in lines(sections, "terminal")] == ["A", "  everywhere", "  of a screen"]
-    assert text(sections) == "\nA\n  everywhere"
+    assert text(sections) == "A\n  everywhere"
 
 
 def test_texts_from_outside_lose_their_characters_of_control():
