@@ -191,12 +191,15 @@ def test_there_is_no_snippet_while_readings_are_left(call):
     answer = call("advise", "run", "--theta", "0.1", "--ratio", "1.4", "--snippets", "all")
     assert answer.status == 0
     assert "WHICH RUN NEXT?" in answer.out
-    assert answer.err == "no snippet: several readings are left, make the run that is named\n"
+    assert answer.err == "no snippet: several readings are left; make the run that the answer names\n"
 
 
 @pytest.mark.parametrize(
     ("words", "fragment"),
-    [(["--snippets", "preCISE"], "'preCISE'"), (["--snippets", "all", "--json"], "received --snippets with --json")],
+    [
+        (["--snippets", "preCISE"], "--snippets = preCISE: needed one of preCICE"),
+        (["--snippets", "all", "--json"], "received --snippets with --json"),
+    ],
     ids=["unknown", "json"],
 )
 def test_snippets_that_cannot_be_had_are_refused_in_one_line(call, write, words, fragment):

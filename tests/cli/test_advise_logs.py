@@ -141,7 +141,10 @@ def test_the_first_line_says_what_is_assumed_and_friction_takes_the_theta_away(c
         ("run --theta 0.1 --ratio 1.4 --friction 0.2", "received 0.2: needed options only"),
         ("run --theta 0.1 --ratio 1.4 --friction --tied", "tied with friction: needed one of them"),
         ("matrices --S1 a.npz --S2 b.npz --friction", "'--friction' requires an argument"),
-        ("matrices --S1 a.npz --friction --S2 b.npz", "--friction = --S2: needed a number >= 0, as --friction 0.2"),
+        (
+            "matrices --S1 a.npz --friction --S2 b.npz",
+            "--friction = --S2: needed a number >= 0, such as --friction 0.2",
+        ),
         ("moduli --young 7,2 --poisson 0.3,0.3 --friction", "an option of ndtheory advise matrices and"),
     ],
 )

@@ -223,7 +223,7 @@ def test_a_body_of_two_materials_is_refused_with_their_names(call, write, tmp_pa
     [
         ({"names": ("left", "right", "under", "top")}, ["body1.fixed", '"bottom"', "left, right, under, top"]),
         ({"lift": lambda x: 0.1 * x}, ["contact", "top"]),
-        ({"y": (-0.2, 0.1)}, ["lie in each other", "y = 0.1"]),
+        ({"y": (-0.2, 0.1)}, ["the bodies overlap", "y = 0.1"]),
     ],
     ids=["unknown side", "slope", "in each other"],
 )

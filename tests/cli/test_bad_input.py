@@ -122,8 +122,8 @@ TOGETHER = {
         {"body2.prescribed": '{ top = [0.0, -0.015], left = [0.1, "free"] }'},
         ["body2.prescribed", "'top'", "0.1", "(0.4, 0.3)"],
     ),
-    "drawn into each other": ({"body2.y": "[-0.1, 0.3]"}, ["body2.y", "lie in each other", "y = -0.1", "5 %", "0.3"]),
-    "the upper body first": ({"body1.y": "[0.3, 0.6]"}, ["body2.y", "lie in each other", "y = 0.6", "y = 0"]),
+    "drawn into each other": ({"body2.y": "[-0.1, 0.3]"}, ["body2.y", "the bodies overlap", "y = -0.1", "5 %", "0.3"]),
+    "the upper body first": ({"body1.y": "[0.3, 0.6]"}, ["body2.y", "the bodies overlap", "y = 0.6", "y = 0"]),
     "apart along x": ({"body2.x": "[3.0, 4.2]"}, ["body2.x", "do not meet", "0 to 2", "3 to 4.2"]),
     "an interval outside the overlap": ({"contact.interval": "[0.2, 1.6]"}, ["contact.interval", "[0.4, 1.6]"]),
     "an interval that ends between nodes": (
@@ -154,7 +154,7 @@ BARS = {
     "a bar has no bottom": ({"body1.fixed": '["bottom"]'}, ["body1.fixed", "bottom", "left, right"]),
     "a bar held at its contact end": ({"body1.fixed": '["left", "right"]'}, ["body1.fixed", "normal component"]),
     "a bar that flies": ({"body1.fixed": None}, ["body1", "nothing is left to iterate", "ndtheory solve"]),
-    "bars in each other": ({"body2.x": "[0.9, 2.0]"}, ["body2.x", "lie in each other", "x = 1", "x = 0.9"]),
+    "bars in each other": ({"body2.x": "[0.9, 2.0]"}, ["body2.x", "the bodies overlap", "x = 1", "x = 0.9"]),
 }
 
 #: What is no problem file at all: bytes, then fragments.

@@ -361,7 +361,7 @@ def test_a_gamma_c_that_is_too_short_is_warned_of_and_ends_no_command(call, writ
     answer = call(command, write({"contact.interval": "[0.6, 1.4]"}), "--json")
     (warning,) = answer.err.splitlines()
     assert answer.status == 0
-    assert warning.startswith("warning: outside Gamma_c the bodies lie in each other, by 0.0")
+    assert warning.startswith("warning: outside Gamma_c the bodies overlap, by 0.0")
     run = answer.document if command != "compare" else answer.document["run"]
     assert warning == f"warning: {run['warnings'][0]}"
     assert run["checks"]["penetration_outside"] > 0.005

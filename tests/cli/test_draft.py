@@ -128,7 +128,7 @@ def test_a_file_with_two_bodies_becomes_a_problem_of_two_edits(call, tmp_path, m
     assert '# fixed = ["a bottom"]  # choose the sides that hold it: a bottom' not in answer.out  # names are in quotes
     assert '# fixed = ["a bottom"]  # choose the sides that hold it: "a bottom", "a right", "a left"' in answer.out
     assert '# prescribed = { "b top" = [0.0, -0.005] }' in answer.out
-    assert answer.err.splitlines()[1].startswith("left to choose: body 2: choose the sides that move, and how far")
+    assert answer.err.splitlines()[1].startswith("to do: body 2: choose the sides that move, and how far")
     assert finished(answer.out, tmp_path, most=2).contact.force["normal"] == pytest.approx(525, rel=1e-9)
 
 

@@ -98,7 +98,7 @@ def of_kind(command: Callable[..., None]) -> Callable[..., None]:
         except ValueError as error:
             raise click.UsageError(str(error)) from None
         if parallel and given.get("snippets"):
-            raise click.UsageError("received --snippets with --parallel: the blocks are of serial coupling")
+            raise click.UsageError("received --snippets with --parallel: the blocks are for serial coupling")
         command(kind=of, **given)
 
     return typed
@@ -132,7 +132,7 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     roles by theta (no unit) and the factor of a step, predicted and proved.  It has lines to paste for your library.
 
     The commands below need no problem file; two solvers that are Python functions are coupled by verification.couple.
-    Write ./run for a file that has the name of a command.
+    For a file named like a command, such as run, type ./run.
 
     \b
     Examples:
@@ -237,7 +237,7 @@ def matrices(kind: Kind, snippets: str | None, as_json: bool, **given: Any) -> N
     metavar="FILE",
     type=PATH,
     multiple=True,
-    help="Convergence log, such as precice-Solid-convergence.log; may be repeated with its --theta.",
+    help="Convergence log, such as precice-Solid-convergence.log; repeat it with the --theta of each.",
 )
 @click.option(
     "--theta",
@@ -281,10 +281,10 @@ def run(
 ) -> None:
     """Bound rho from runs of any other code.
 
-    Give runs with constant theta (no unit), as logs or as the ratio of the residuals of one run.  The answer lists what
-    they can mean, and which theta to run next.  Aitken's factors in a log show both ends of the spectrum.  Without
-    --friction runs are read as runs without friction.  Give the ratio of the absolute residual |Tg - g|, not of the
-    relative one of coupling libraries; a log may hold either, in any unit.
+    Give runs with constant theta (no unit), as logs or as the ratio of the residuals of one run.  The answer lists the
+    values of rho that fit, and which theta to run next.  Aitken's factors in a log show both ends of the spectrum.
+    Without --friction the answer assumes that there is none.  Give the ratio of the absolute residual |Tg - g|, not of
+    the relative one of coupling libraries; a log may hold either, in any unit.
 
     Logs may be of preCICE, Kratos, solids4foam, FOAM-FSI, Norma.jl, Feel++, MOOSE, CoCoNuT, OpenMDAO, Elmer, GEOS and
     SU2, columns of numbers, or others with a --pattern.
@@ -300,8 +300,8 @@ def run(
     """
     _no_document_of(snippets, as_json)
     if bool(logs) == bool(ratios):
-        received = "--log with --ratio: a log shows its own ratio" if logs else "neither --log nor --ratio"
-        raise click.UsageError(f"received {received}: needed one of --log and --ratio")
+        received = "--log with --ratio" if logs else "neither --log nor --ratio"
+        raise click.UsageError(f"received {received}: needed one of them; the ratio of a log is read from it")
     of_logs = {"--pattern": pattern, "--format": name, "--log10": log10}
     if not logs and (alone := [option for option, value in of_logs.items() if value]):
         raise click.UsageError(f"received {alone[0]} without --log")
@@ -501,8 +501,8 @@ def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | Non
             raise click.UsageError(f"received --snippets where theta = {found.theta:g}: the libraries take at most 1")
         deliver(found, lambda found: blocks(found, snippets), as_json)
         if found.advised_exchanged:
-            complain(f"the roles are as they are: {found.advised_exchanged}")
+            complain(f"the roles are not exchanged: {found.advised_exchanged}")
     else:
         deliver(found, Document.sections, as_json, typing=nothing_typed if typed is None else typed.command)
     if snippets is not None and found.theta is None:
-        complain(f"no snippet: {found.why_no_theta.partition(':')[0]}, make the run that is named")
+        complain(f"no snippet: {found.why_no_theta.partition(':')[0]}; make the run that the answer names")

@@ -74,7 +74,7 @@ def certify(
 
     The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Anyone
     can check it with a script of under 400 lines, verification/certificate/check.py, which imports nothing of this
-    program (only python-flint, for interval arithmetic).  Exit 1 where contraction is not proved.
+    program (only python-flint, for interval arithmetic).  Exit 1 if contraction is not proved.
 
     \b
     Examples:

@@ -18,9 +18,9 @@ from verification.cli.options import JSON, PATH
 def draft(mesh: Path, mesh2: Path | None, as_json: bool) -> None:
     """Write a problem file for one mesh file with all bodies, or for two.
 
-    The bodies of one file are its pieces, by their physical surfaces (element sets).  Of two files each is a body.
-    Named lines are sides, and those that face each other nearby may touch.  Comments name what is left to choose;
-    most files need two edits: the supports of both bodies.
+    The bodies of one file are its pieces, by their physical surfaces (element sets).  With two files, each file is one
+    body.  Named lines are sides, and those that face each other nearby may touch.  Comments name what you have to
+    choose: in most files only the supports of both bodies.
 
     \b
     Example:
@@ -32,4 +32,4 @@ def draft(mesh: Path, mesh2: Path | None, as_json: bool) -> None:
     found = drafted(*(path for path in (mesh, mesh2) if path is not None))
     say(found.to_json() if as_json else found.toml.rstrip())
     for choice in () if as_json else found.choices:
-        complain(f"left to choose: {choice}")
+        complain(f"to do: {choice}")

@@ -32,7 +32,7 @@ def march(typed: Typed, solver: Any, method: Any, folder: Path | None, as_json: 
     """Follow the loading history of FILE, increment by increment.
 
     The [[step]] tables of FILE have the loads.  Friction measures slip from the end of the last increment, so that it
-    depends on the path.  Exit 0 where every increment was computed, 1 where one did not converge, 130 after Ctrl-C;
+    depends on the path.  Exit 0 if every increment was computed, 1 if one did not converge, 130 after Ctrl-C;
     what was computed is shown and written.
 
     \b

@@ -174,7 +174,7 @@ def constants(typed: Typed, refine: int, verified: bool, as_json: bool) -> None:
 def run(typed: Typed, solver: Any, start: Path | None, folder: Path | None, as_json: bool) -> int:
     """Run the Neumann-Dirichlet iteration on FILE.
 
-    Exit 0 where it converged, 1 where it did not, 130 after Ctrl-C (what was computed is shown and written).
+    Exit 0 if it converged, 1 if it did not, 130 after Ctrl-C (what was computed is shown and written).
 
     \b
     Example:
@@ -213,7 +213,7 @@ def solve(typed: Typed, folder: Path | None, as_json: bool) -> int:
     """Solve both bodies of FILE at once, without decomposition.
 
     This global method shares only the matrices with the iteration.  One body may be rigid (shape = "rigid"), and
-    contact may be all that holds a body in one direction.  Exit 1 where no solution was found that passes the checks.
+    a body may be held by contact alone in one direction.  Exit 1 if no solution was found that passes the checks.
 
     \b
     Example:
@@ -257,7 +257,7 @@ def compare(
 ) -> int:
     """Measure constants, evaluate bounds, run, and judge each bound.
 
-    Exit 1 where a proved bound is violated or the run stalls or diverges, 3 where rounding hides the answer.  Reaching
+    Exit 1 if a proved bound is violated or the run stalls or diverges, 3 if rounding hides the answer.  Reaching
     max_iterations does not count as a failure here: the verdicts judge single steps.
 
     \b

@@ -162,7 +162,7 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
             short = "a line of contact is too short or is missing, and the forces are wrong"
         if cut_depth:
             short += "; nodes of a named side would touch, at which the other side does not face it as they are drawn"
-        crossed = (f"outside Gamma_c the bodies lie in each other, {where}: {short}",)
+        crossed = (f"outside Gamma_c the bodies overlap, {where}: {short}",)
     return Checks(
         penetration_outside=depth,
         penetration_at=at,

@@ -1,4 +1,4 @@
-"""A draft of a problem file from mesh files, with comments for what is left to choose."""
+"""A draft of a problem file from mesh files, with comments on what the user has to choose."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Draft(Document):
     toml: str = key("its text")
     bodies: tuple[Drawn, ...] = key("its bodies in their order, from below")
     contacts: tuple[Touch, ...] = key("the sides that may touch, the nearest first")
-    choices: tuple[str, ...] = key("what is left to choose, as sentences")
+    choices: tuple[str, ...] = key("what the user has to choose, as sentences")
 
 
 def draft(*paths: Path) -> Draft:

@@ -37,8 +37,8 @@ UPPER = (True, False)
 #: Within this part of the smaller extent of the bodies a second part of a side that faces the other body could touch.
 REACH = 0.1
 
-#: How bodies that lie in each other come apart, and how sides that face each other in any direction are found.
-APART = "; draw them apart, or give contact.gap (of two bodies)"
+#: How bodies that overlap come apart, and how sides that face each other in any direction are found.
+APART = "; draw them apart, or set contact.gap (only with two bodies)"
 CUT = "; contact.surface instead cuts whole sides to whole edges"
 BY_NAME = "contact.surface names sides that face each other in any direction"
 
@@ -132,7 +132,7 @@ def _along_x(problem: Problem, meshes: list[Mesh | None], known: list[Supports |
         axis, where = ("x", "") if problem.dimension == 1 else ("y", f"at x = {at[j]:g} ")
         low, high = (np.broadcast_to(level, at.shape)[j] for level in levels)
         needed = (
-            f"the bodies lie in each other: {where}body 1 ends at {axis} = {low:g}, body 2 begins at {axis} ="
+            f"the bodies overlap: {where}body 1 ends at {axis} = {low:g}, body 2 begins at {axis} ="
             f" {high:g}; needed an overlap of at most {100 * MOST_OVERLAP:g} % of the height {height:g}{APART}"
         )
         raise problem.refuse(f"body2.{axis}", None, needed)
@@ -214,7 +214,7 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
     if gap[j] < -MOST_OVERLAP * height:
         depth = f"by {-gap[j]:.4g} at {place_of(line.points[j])}"
         needed = f"needed an overlap of at most {100 * MOST_OVERLAP:g} % of the smaller extent {height:g}{APART}"
-        raise refuse(f"the bodies lie in each other {depth}: {needed}")
+        raise refuse(f"the bodies overlap {depth}: {needed}")
     return nodes if contact == 0 else nodes[::-1], grids if contact == 0 else grids[::-1], P, gap
 
 

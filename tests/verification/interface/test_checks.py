@@ -1,4 +1,4 @@
-"""Surfaces outside Gamma_c that lie in each other, and large strains."""
+"""Surfaces outside Gamma_c that overlap, and large strains."""
 
 import re
 from dataclasses import replace
@@ -18,7 +18,7 @@ TOO_SHORT = changed(body1={"cells": [20, 3]}, body2={"cells": [12, 3]}, contact=
 
 
 def crossing(warnings):
-    return [words for words in warnings if words.startswith("outside Gamma_c the bodies lie in each other")]
+    return [words for words in warnings if words.startswith("outside Gamma_c the bodies overlap")]
 
 
 def strained(warnings):

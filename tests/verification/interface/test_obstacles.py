@@ -178,7 +178,7 @@ def test_a_face_that_the_contact_does_not_name_and_one_of_an_elastic_body_are_re
 @pytest.mark.parametrize(("line", "message"), [
     ([[5, 1], [6, 1]], r"has no part that faces one as a whole edge"),
     ([[-1, 1], [0, 0], [1, 1]], r"faces another part too"),
-    ([[-1, "-0.5"], [1, "-0.5"]], r"the bodies lie in each other"),
+    ([[-1, "-0.5"], [1, "-0.5"]], r"the bodies overlap"),
 ])  # fmt: skip
 def test_a_face_that_no_edge_meets_once_is_refused(line, message):
     with pytest.raises(vf.ProblemError, match=message):
@@ -199,5 +199,5 @@ def test_bodies_that_overlap_deeply_at_one_end_only_are_refused_with_that_place(
     upper = {"shape": "rectangle", "x": [0, 2], "y": [0, "0.3"], "cells": [20, 3], "prescribed": {"top": [0, "-0.01"]}}
     moduli = {"young": 1000, "poisson": "0.3"}
     data = {"body1": lower | moduli | {"fixed": ["bottom"]}, "body2": upper | moduli, "contact": {"interval": [0, 2]}}
-    with pytest.raises(vf.ProblemError, match=r"the bodies lie in each other: at x = 2 body 1 ends at y = 0\.018"):
+    with pytest.raises(vf.ProblemError, match=r"the bodies overlap: at x = 2 body 1 ends at y = 0\.018"):
         vf.solve(vf.Problem.from_dict(data))

@@ -210,7 +210,7 @@ def test_a_side_of_one_edge_that_is_not_faced_as_a_whole_is_refused_with_the_rol
     ("keys", "remedy"),
     [
         ({"body2.x": "[5, 6]"}, "contact.surface names sides that face each other in any direction"),
-        ({"body2.y": "[-0.5, 0.5]"}, "draw them apart, or give contact.gap (of two bodies)"),
+        ({"body2.y": "[-0.5, 0.5]"}, "draw them apart, or set contact.gap (only with two bodies)"),
         ({"contact.interval": "[0.1, 1]"}, "contact.surface instead cuts whole sides to whole edges"),
         ({"body2.traction.bottom": "[0, 1]"}, "point_load gives one to its nodes"),
     ],
