@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from fractions import Fraction
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -15,7 +14,7 @@ from ndtheory import HypothesisError, exact
 from ndtheory.texts import did_you_mean
 from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import AdviseCommand, AdviseGroup, Default, cli
-from verification.cli.options import JSON, PATH, SET, SWAP, F, OneOf, Typed
+from verification.cli.options import JSON, PATH, SET, SWAP, F, OneOf, Typed, number
 from verification.cli.problems import load_problem
 from verification.coupling.kinds import Kind, KindName, kind_of
 from verification.coupling.snippets import SNIPPETS
@@ -160,21 +159,6 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     _show(found, snippets, as_json, Typed(file=file, keys=keys, swap=swap))
 
 
-def _number(needed: str, fits: Callable[[Fraction], bool]) -> Callable[..., str | None]:
-    """A callback that refuses what is not such a number."""
-
-    def read(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-        try:
-            good = value is None or fits(exact(value))
-        except (ValueError, OverflowError):
-            good = False
-        if not good:
-            raise click.BadParameter(f"{value}: needed {needed}")
-        return value
-
-    return read
-
-
 def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callable[[F], F]:
     """An option that names a file with a matrix."""
     return click.option(option, parameter, type=PATH, metavar="MATRIX", help=words, **settings)
@@ -191,14 +175,14 @@ def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callabl
 @click.option(
     "--friction",
     metavar="K",
-    callback=_number("a number >= 0, such as --friction 0.2", lambda k: k >= 0),
+    callback=number("a number >= 0, such as --friction 0.2", lambda k: k >= 0),
     help="Friction k >= 0, with --x and --radius, or with --kernel and --weights or --x.",
 )
 @_matrix("--x", "x", "Positions of the nodes of the contact body, increasing.")
 @click.option(
     "--radius",
     metavar="LENGTH",
-    callback=_number("a number > 0", lambda radius: float(radius) > 0),
+    callback=number("a number > 0", lambda radius: float(radius) > 0),
     help="Radius of the hat kernel, in the unit of --x.",
 )
 @_matrix("--kernel", "kernel", "Operator S of the law of friction: normal nodal forces to stress at these nodes.")
@@ -319,13 +303,13 @@ def run(
     from verification.coupling.log_lines import PatternError
 
     try:
-        given = _thetas_of(logs, thetas, {"pattern": pattern, "name": name, "log10": log10})
+        form: dict[str, Any] = {"pattern": pattern, "log10": log10}
+        given = _thetas_of(logs, thetas, {**form, "name": name})
         if len(given) != max(len(logs), len(ratios)):
             received = f"received {len(thetas)} --theta with {len(logs)} --log and {len(ratios)} --ratio"
             raise click.UsageError(f"{received}: needed one --theta for each of them")
         if logs:
-            form: dict[str, Any] = {"pattern": pattern, "format": name, "log10": log10}
-            found = advise_logs(zip(logs, given, strict=True), kind=kind, friction=friction, **form)
+            found = advise_logs(zip(logs, given, strict=True), kind=kind, friction=friction, format=name, **form)
         else:
             *earlier, last = zip(thetas, ratios, strict=True)
             found = advise_run(*last, kind=kind, friction=friction, earlier=earlier)

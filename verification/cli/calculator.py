@@ -62,20 +62,18 @@ def bounds(
       ndtheory bounds --m 1 --M 2 --CR 1 --CK 0.05 -o h.svg
       ndtheory bounds --rho 0.475 --kappa1 0.986 --kappa2 0.427 --theta 0.7
     """
-    of_section_5 = {key: given[key] for key in SECTION_5}
-    of_norms = {key: given[key] for key in ENERGY}
+    of_section_5, of_norms = (
+        {key: value for key, value in given.items() if key in keys and value is not None}
+        for keys in (SECTION_5, ENERGY)
+    )
     if check and theta is None:
         raise click.UsageError("--check needs --theta")
-    alone = of_norms["rho"] is not None and not any(
-        of_section_5[key] is not None for key in ("m", "M", "C_R", "C_K", "C_s", "C_tr")
-    )
+    alone = "rho" in of_norms and of_section_5.keys() <= {"k"}
     constants = None if alone else _constants(of_section_5)
     if target is not None and constants is None:
         raise click.UsageError("-o draws h_1 and h_2: it needs --m, --M, --CR and --CK")
     friction = (
-        take("k", 0 if given["k"] is None else given["k"], "a number k >= 0", lambda k: k >= 0)
-        if constants is None
-        else constants.C_K
+        take("k", of_section_5.get("k", 0), "a number k >= 0", lambda k: k >= 0) if constants is None else constants.C_K
     )
     energy = _energy(of_norms, friction > 0)
     subject = Subject(
@@ -97,23 +95,23 @@ def bounds(
     return 1 if check and not proved else 0
 
 
-def _constants(given: Mapping[str, str | None]) -> Constants:
+def _constants(given: Mapping[str, str]) -> Constants:
     for key in ("m", "M", "C_R"):
-        if given[key] is None:
+        if key not in given:
             needed = "needed --m, --M, --CR and --CK, or --rho"
             raise click.UsageError(f"{OPTIONS[key]} is missing: {needed}")
-    return Constants(**{key: value for key, value in given.items() if value is not None})
+    return Constants(**given)
 
 
-def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | None:
+def _energy(given: Mapping[str, str], rubs: bool) -> EnergyConstants | None:
     """The constants of the bound in energy norms; None where they were not given."""
-    missing = [OPTIONS[key] for key in ENERGY if given[key] is None]
+    missing = [OPTIONS[key] for key in ENERGY if key not in given]
     if len(missing) == len(ENERGY):
         return None
-    if given["rho"] is None or len(missing) == 1 or (rubs and missing):
+    if "rho" not in given or len(missing) == 1 or (rubs and missing):
         needed = "the bound in energy norms needs --rho, and with friction --kappa1 and --kappa2"
         raise click.UsageError(f"{', '.join(missing)} missing: {needed}")
     try:
-        return EnergyConstants(**{key: value for key, value in given.items() if value is not None})
+        return EnergyConstants(**given)
     except HypothesisError as error:
         raise HypothesisError(OPTIONS[error.key], error.value, error.needed) from None

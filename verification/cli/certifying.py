@@ -98,12 +98,10 @@ def certify(
             raise click.UsageError(f"received {clash[0]} with {option}: needed one of both")
     if file is None and given is None:
         raise click.UsageError("received nothing: needed FILE, or --check FILE.json")
-    typed = None if file is None else Typed(file=file, keys=keys, theta=theta, swap=swap)
-    problem = None if typed is None else load(typed)
+    typed = Typed(file=file or Path(), keys=keys, theta=theta, swap=swap)
+    problem: Any = None if file is None else load(typed)
     if given is not None:
         return _check(given, problem, as_json)
-    assert problem is not None
-    assert typed is not None
     from ndtheory.continuum.strip import Unproved
     from verification.certificate import sections as shown
     from verification.certificate.claims import NoCertificate

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -27,17 +28,7 @@ from verification.output.files import writing
 )
 @one_file(".svg", ".png", words="Figure to draw, the factor over theta and k")
 @JSON
-def layers(
-    young: str,
-    poisson: str,
-    depth: str,
-    friction: str,
-    radius: str,
-    theta: str | None,
-    verified: bool,
-    target: Path | None,
-    as_json: bool,
-) -> None:
+def layers(target: Path | None, as_json: bool, **given: Any) -> None:
     """Bound the factor of one step between two layers, without a mesh.
 
     Two layers, each clamped at its far side, touch along any part of a line.  The proof
@@ -52,11 +43,9 @@ def layers(
     from verification.document import Document
     from verification.free_norm.two_layers import two_layers
 
-    E, nu, d = (words.split(",") for words in (young, poisson, depth))
+    given |= {name: given[name].split(",") for name in ("young", "poisson", "depth")}
     try:
-        found = two_layers(
-            young=E, poisson=nu, depth=d, friction=friction, radius=radius, theta=theta, verified=verified
-        )
+        found = two_layers(**given)
     except HypothesisError as error:
         raise click.UsageError(f"--{error}") from None
     deliver(found, Document.sections, as_json, writing(target, as_figure), target)

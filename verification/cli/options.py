@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields
+from fractions import Fraction
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from ndtheory import exact
 from ndtheory.texts import did_you_mean
 from verification.show.layout import nothing_typed
 from verification.show.parts import Next
@@ -19,6 +22,7 @@ if TYPE_CHECKING:
     from verification.output.files import Kind
 
 F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
 
 PATH = click.Path(path_type=Path)
 FILE = click.argument("file", type=PATH)
@@ -55,16 +59,16 @@ class OneOf(click.Choice[str]):
         return f"{value}: needed one of {', '.join(self.choices)}{did_you_mean(str(value), self.choices)}"
 
 
-class Whole(click.IntRange):
-    """A whole number of a range; the error for another value has the range."""
+def number(needed: str, fits: Callable[[Fraction], bool], of: Callable[[str], T] = str) -> Callable[..., T | None]:  # type: ignore[assignment]
+    """A callback that refuses what is not such a number."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The number."""
-        try:
-            return super().convert(value, param, ctx)
-        except click.BadParameter:
-            limits = f"of at least {self.min}" if self.max is None else f"from {self.min} to {self.max}"
-            raise click.BadParameter(f"{value}: needed a whole number {limits}") from None
+    def read(context: click.Context, parameter: click.Parameter, value: str | None) -> T | None:
+        with suppress(ValueError, OverflowError):
+            if value is None or fits(exact(value)):
+                return None if value is None else of(value)
+        raise click.BadParameter(f"{value}: needed {needed}")
+
+    return read
 
 
 class Registered(OneOf):
@@ -125,11 +129,15 @@ SOLVER = click.option(
 )
 
 
-def folder_name(context: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
-    """The folder of ``-o``; an empty name is refused."""
-    if value == "":
-        raise click.BadParameter("'': needed the name of a folder")
-    return None if value is None else Path(value)
+def into(words: str, **more: Any) -> Callable[[F], F]:
+    """The option ``-o`` of a command that fills a folder; an empty name is refused."""
+
+    def named(context: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
+        if value == "":
+            raise click.BadParameter(": needed the name of a folder")
+        return None if value is None else Path(value)
+
+    return click.option("-o", "--output", "folder", callback=named, metavar="DIR", help=words, **more)
 
 
 def writer(path: Path | None, kind: Kind) -> Callable[[Any], None] | None:
@@ -174,9 +182,14 @@ def one_file(
     )
 
 
-FOLDER = click.option("-o", "--output", "folder", callback=folder_name, metavar="DIR", help="Folder for the results.")
+FOLDER = into("Folder for the results.")
 
-JOBS = click.option("--jobs", type=Whole(1), metavar="N", help="Number of processes; one for each core by default.")
+JOBS = click.option(
+    "--jobs",
+    callback=number("a whole number of at least 1", lambda n: n >= 1, int),
+    metavar="N",
+    help="Number of processes; one for each core by default.",
+)
 STORE = click.option("--store", type=PATH, metavar="STORE", help="File that keeps the rows of runs (SQLite).")
 
 

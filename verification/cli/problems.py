@@ -17,20 +17,7 @@ import click
 from ndtheory.keys import key
 from verification.cli.console import complain, deliver, one_by_one, progress, remember, say, stages, warn
 from verification.cli.forms import cli
-from verification.cli.options import (
-    BOUNDS,
-    FOLDER,
-    FULL,
-    JSON,
-    PATH,
-    RUN,
-    SWAP,
-    Typed,
-    Whole,
-    folder_name,
-    of_a_file,
-    writer,
-)
+from verification.cli.options import BOUNDS, FOLDER, FULL, JSON, PATH, RUN, SWAP, Typed, into, number, of_a_file, writer
 from verification.document import Document
 
 if TYPE_CHECKING:
@@ -141,7 +128,13 @@ def load(typed: Typed) -> Problem:
 
 @cli.command()
 @of_a_file(SWAP)
-@click.option("--refine", type=Whole(0, 8), default=0, metavar="N", help="Also measure on meshes halved 1 to N times.")
+@click.option(
+    "--refine",
+    callback=number("a whole number from 0 to 8", lambda n: 0 <= n <= 8, int),
+    default="0",
+    metavar="N",
+    help="Also measure on meshes halved 1 to N times.",
+)
 @click.option("--verified", is_flag=True, help="Prove bounds of each constant, for the exact data of FILE on its mesh.")
 @JSON
 def constants(typed: Typed, refine: int, verified: bool, as_json: bool) -> None:
@@ -277,16 +270,7 @@ def compare(
 
 
 @cli.command()
-@click.option(
-    "-o",
-    "--output",
-    "folder",
-    callback=folder_name,
-    metavar="DIR",
-    default="ndtheory-demo",
-    show_default=True,
-    help="Folder to write.",
-)
+@into("Folder to write.", default="ndtheory-demo", show_default=True)
 @FULL
 @JSON
 def demo(folder: Path, full: bool, as_json: bool) -> int:
@@ -337,15 +321,13 @@ def _status_of_run(finished: Run, swapped: bool) -> int:
 
 
 def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:
-    outcome = comparison.run.outcome
-    if comparison.run.interrupted:
-        return _status_of_run(comparison.run, swapped)
-    if comparison.proved_violated:
+    run = comparison.run
+    if comparison.proved_violated and not run.interrupted:
         complain("a proved bound is violated: a bug in this program or an error in the proof; please report it")
         return 1
-    if outcome in ("stalled", "diverged"):
-        return _status_of_run(comparison.run, swapped)
-    complain_of(comparison.run, swapped)
+    if run.interrupted or run.outcome in ("stalled", "diverged"):
+        return _status_of_run(run, swapped)
+    complain_of(run, swapped)
     return 3 if comparison.inconclusive else 0
 
 

@@ -121,15 +121,8 @@ def sweep(
     warn(found.notes, "", wide=True)
     if found.stored:
         complain(f"{kept}: {found.stored} of {found.asked} rows were there")
-    sections = lambda found: shown.sections(found, target)
-    deliver(
-        found,
-        sections,
-        as_json,
-        lambda found: _write(found, targets),
-        target,
-        typing=Typed(file=Path(problem.source)).command,
-    )
+    sections, typing = partial(shown.sections, target=target), Typed(file=Path(problem.source)).command
+    deliver(found, sections, as_json, partial(_write, targets=targets), target, typing=typing)
     if found.interrupted:
         raise KeyboardInterrupt(f"{found.reason['rows']}: those are in {target}; the same command goes on from there")
 

@@ -302,13 +302,12 @@ def _written(x: tuple[float, float], y: tuple[float, float], columns: int, line:
 
 def write(path: Path, **bodies: fem1d2d.Mesh) -> None:
     """Write bodies with the same names of sides as Gmsh does, bodies and sides as physical groups."""
-    blocks: list[tuple[str, Any]] = []
-    of, first = list[str](), 0
+    blocks, tags, number, first = list[Any](), list[Any](), dict[str, int](), 0
     for body, mesh in bodies.items():
-        blocks += [*(("line", facets + first) for facets in mesh.sides.values()), ("triangle", mesh.cells + first)]
-        of, first = [*of, *mesh.sides, body], first + len(mesh.points)
-    number = {name: tag for tag, name in enumerate(dict.fromkeys(of), 1)}
-    tags = [np.full(len(cells), number[name]) for name, (_, cells) in zip(of, blocks, strict=True)]
+        for name, cells in {**mesh.sides, body: mesh.cells}.items():
+            blocks.append(("triangle" if name == body else "line", cells + first))
+            tags.append(np.full(len(cells), number.setdefault(name, len(number) + 1)))
+        first += len(mesh.points)
     written = meshio.Mesh(
         np.pad(np.concatenate([mesh.points for mesh in bodies.values()]), ((0, 0), (0, 1))),
         blocks,

@@ -50,14 +50,13 @@ def write_inputs(folder: Path) -> None:
     log += [f"{1:6d}  {each.iteration + 1:6d}  {each.relative_residual:16.8e}" for each in made.iterates]
     texts = {"my.toml": built_in["section6"], "history.toml": built_in["history"], "grid.toml": GRID}
     texts["convergence.log"] = "\n".join(log)
-    arrays = {f"S{i}.npy": side.schur for i, side in enumerate(pair.along_y, 1)}
-    arrays |= {"X.npy": np.array([each.g for each in made.iterates])}
-    arrays |= {"TX.npy": np.array([each.image for each in made.iterates])}
+    arrays = {f"S{i}": side.schur for i, side in enumerate(pair.along_y, 1)}
+    arrays["X"], arrays["TX"] = (np.array(rows) for rows in zip(*((i.g, i.image) for i in made.iterates), strict=True))
     with staged(folder) as room:
         for name, text in texts.items():
             (room / name).write_text(text.rstrip() + "\n", encoding="utf-8")
         for name, array in arrays.items():
-            np.save(room / name, array)
+            np.save(room / f"{name}.npy", array)
         write(room / "model.msh", lower=pair.body1.loaded_body.mesh, upper=pair.body2.loaded_body.mesh)
         for name in INPUTS:
             there = folder / name
