@@ -94,9 +94,7 @@ def _bodies_of_several(top: TomlTable, around: Mapping[str, Any]) -> dict[int, B
     bodies = {i: _read_body(top.table(f"body{i}", required=True), around) for i in numbers}
     for i, body in bodies.items():
         if body.rigid:
-            needed = (
-                "needed an elastic body where there are several; one that is fixed and stiff stands for an obstacle"
-            )
+            needed = "needed an elastic body, as there are several; one that is fixed and stiff replaces an obstacle"
             raise top.refuse(f"body{i}.shape", "rigid", needed)
         if not _within([bodies[j] for j in numbers if j <= i], MOST_WITHIN):
             needed = f"needed a modulus within {float(MOST_WITHIN):g} times those before it"

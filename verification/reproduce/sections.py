@@ -66,6 +66,6 @@ def _says(outcome: Outcome) -> str:
     found = []
     for curve in outcome.curves:
         at = curve.steps.get(0.6)
-        best = "none arrives" if not curve.best else f"{curve.best[0]:g}: {curve.fewest}"
+        best = "none converges" if not curve.best else f"{curve.best[0]:g}: {curve.fewest}"
         found.append(f"{best} (0.6: {'-' if at is None else at})")
     return "best theta: steps " + "; ".join(found)

@@ -167,7 +167,7 @@ def best_theta(
     return BestTheta(
         rho=rho,
         predicted=predicted,
-        seen=found("seen", "" if runs else "no runs were asked for", lambda: _seen(pair, rho), "no run arrived"),
+        seen=found("seen", "" if runs else "no runs were asked for", lambda: _seen(pair, rho), "no run converged"),
         linearised=found("linearised", "", lambda: _linearised(pair, measured)),
         energy=found("energy", outside, lambda: _energy(energy), "q(theta) is below 1 for no theta"),
         semidefinite=found(

@@ -279,7 +279,7 @@ def test_bodies_that_move_together_are_refused():
         ({"contact": [touch(1, 2), touch(2, 3, interval=[0, 1])]}, "contact[2].surface", "either surface or interval"),
         ({"contact": [touch(1, 2), touch(2, 3, radios=1)]}, "contact[2].radios", "did you mean 'radius'"),
         ({"body3": plate((2, 3), -1)}, "body3.young", "a number > 0"),
-        ({"body3": {"shape": "rigid"}}, "body3.shape", "one that is fixed and stiff stands for an obstacle"),
+        ({"body3": {"shape": "rigid"}}, "body3.shape", "one that is fixed and stiff replaces an obstacle"),
         ({"body3": plate((2, 3), "1e-28")}, "body3.young", "within 1e+08"),
         ({"body4": plate((3, 4))}, "body4", "needed a table [[contact]]"),
         ({"step": [{"body4": {}}]}, "step[1].body4", "known here: name, increments, body1, body2, body3"),
