@@ -91,7 +91,7 @@ def test_what_has_no_best_theta_says_why():
     assert (local.energy, local.semidefinite) == (None, None)
     assert local.reason["energy"] == local.reason["semidefinite"] == vf.build(SMALL.changed(law="local")).outside[0]
     short = best_theta(SMALL.changed(max_iterations=1), semidefinite=False)
-    assert (short.seen, short.reason["seen"]) == (None, "no run arrived")
+    assert (short.seen, short.reason["seen"]) == (None, "no run converged")
 
 
 def test_a_body_that_friction_alone_keeps_from_sliding_has_no_best_theta():
