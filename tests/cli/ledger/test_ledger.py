@@ -96,8 +96,8 @@ def test_every_id_that_the_interface_names_is_known():
 
 @pytest.mark.parametrize("level", ["", "Quick", "FULL", "fast", "1", "5.30"])
 def test_a_level_that_is_none_is_refused_by_name(call, never, level):
-    complaint = call("verify", "--level", level).complaint
-    assert all(word in complaint for word in ("--level", repr(level), "quick", "full"))
+    said = f"ndtheory verify: --level = {level}: needed one of quick, full"
+    assert call("verify", "--level", level).complaint.startswith(said)
 
 
 @pytest.mark.parametrize("option", ["--LEVEL", "--refine", "--theta", "--jsn"])

@@ -20,7 +20,7 @@ def test_the_screen_of_a_statement_fits_80_columns_changed_or_not_and_shows_no_r
     assert wide(answer) == []
     assert RAW.findall(answer.out) == []
     assert not set("\\$") & set(answer.out)
-    assert answer.out.splitlines()[1].startswith(f"{id}  ")
+    assert answer.out.splitlines()[0].startswith(f"{id}  ")
     # no label stands without its text
     assert re.findall(r"(?m)^ +(?:repaired|because|uses):?$", answer.out) == []
     kept(lambda row: replace(row, recorded="REPAIRED" if row.verdict == "INCONCLUSIVE" else "INCONCLUSIVE"))
