@@ -155,8 +155,8 @@ class Advice(Document):
     )
     method: Advised | None = key(
         "the method that is advised",
-        null="where none arrives, or nothing decides",
-        why=lambda advice: advice.why_no_theta or "no method arrives in the steps that are simulated",
+        null="where none converges, or nothing decides",
+        why=lambda advice: advice.why_no_theta or "no method converges in the steps that are simulated",
     )
     roles: tuple[Role, ...] = key(
         "the assignment of the file first; for a run or for logs the one that they had, and none unless they decide"

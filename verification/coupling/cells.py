@@ -103,7 +103,8 @@ def suggest(problem: Problem, rho: Number, *, normal: bool) -> Suggested:
         return replace(none, why="rho is larger than rho of the cells: long waves or the ends of Gamma_c decide")
     if problem.body1.parts or problem.body2.parts:
         return replace(none, why="parts of sides need nodes at their ends")
-    best = replace(none, why=f"rho is at most {GAIN:.0%} larger than with cells of one shape that mirror each other")
+    why = f"rho is at most {100 * GAIN:.0f} % larger than with cells of one shape that mirror each other"
+    best = replace(none, why=why)
     least = value / (1 + GAIN)
     rows = (1, *WIDE) if poisson > NARROW else (1,)
     for cells in dict.fromkeys(cells for times in rows for cells in _of_one_shape(problem, times)):
