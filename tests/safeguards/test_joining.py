@@ -177,7 +177,7 @@ REFUSED = {
         {"body1": {"cells": [9, 2]}, "contact": {"radius": "0.001"}},
         "reaches no node of the Neumann grid",
     ),
-    "drawn deep in each other": ({"body2": {"y": ["-0.1", "0.2"]}}, "do not meet|in each other"),
+    "drawn deep in each other": ({"body2": {"y": ["-0.1", "0.2"]}}, "do not meet|overlap"),
 }
 
 
