@@ -25,7 +25,8 @@ nd.onPage("plane", (figure) => {
   const X = { low: LEAST, high: 1, log: true, name: "theta" };
   const Y = { low: LOW, high: HIGH, log: true, name: "friction k" };
   const chart = new nd.Chart({ ...(figure.closest(".slide") ? {} : { width: 440, height: 300 }), label: "Where each form of the theorem proves contraction", x: X, y: Y });
-  widget.pictures.append(chart.root, nd.html("p", { class: "legend" }, "Green: in energy norms. Blue: repaired. Dashed red: printed (dotted: in MPa)."));
+  const legend = nd.html("p", { class: "legend" });
+  widget.pictures.append(chart.root, legend);
 
   // The constants at a ratio of the moduli and a unit of stress (MPa).
   function constants(u) {
@@ -73,6 +74,7 @@ nd.onPage("plane", (figure) => {
     if (close) chart.axes({ low: 0, high: 1, name: "theta" }, { low: 0, high: ZOOM, name: "friction k" });
     else chart.axes(X, Y);
     chart.clear();
+    legend.textContent = `Green: in energy norms. Blue: repaired. Dashed red: printed${widget.revealed ? " (dotted: in MPa)" : ""}.`;
     const top = close ? ZOOM : HIGH, bottom = close ? 1e-9 : LOW;
     const kinds = [
       ["in energy norms", (at) => energy(c, at), { fill: nd.COLOURS.green, "fill-opacity": 0.35, stroke: nd.COLOURS.green }],

@@ -67,11 +67,11 @@ def data() -> dict[str, Any]:
     return widget(
         question="With hardly any friction the printed theorem applies to the model of Section 6. How many steps to an "
         f"error of 1e-9 does it promise at its best theta? The fastest of these runs takes {best[0]}.",
-        answers=["about a hundred", "about a hundred thousand", _words(printed)],
-        right=_words(printed),
+        answers=[_count(energy), _count(repaired), _count(printed)],
+        right=_count(printed),
         wrong={
-            "about a hundred": "so few are promised at a theta that the printed theorem does not allow.",
-            "about a hundred thousand": "that is nearer to the promise of the repaired theorem.",
+            _count(energy): "that is the promise in energy norms, at a theta that is not allowed here.",
+            _count(repaired): "that is the promise of the repaired theorem.",
         },
         why="the printed theorem allows only theta below 3.5e-11. With such a theta the iteration hardly moves, and "
         f"no bound promises much less than its {_count(printed)} steps. The others allow larger theta: the repaired "
@@ -122,7 +122,3 @@ def _none(name: str, theta: str) -> str:
 
 def _count(count: int) -> str:
     return f"{count:,}".replace(",", " ") if count < 1e6 else f"{count:.1e}".replace("e+", "e")
-
-
-def _words(count: int) -> str:
-    return f"{count / 1e9:.0f} thousand million"
