@@ -94,7 +94,11 @@ def parts() -> list[Part]:
                     r"(\rho - \rho_{\min})/(2 + \rho_{\min} + \rho)",
                     f"{energy_norms.tied_rate(rho_min, rho):.3f}",
                 ),
-                Line("steps to 1e-9 at a factor q", r"-9\,\ln 10/\ln q", f"{ceil(9 * log(10) / -log(rate))}"),
+                Line(
+                    "steps to 1e-9 at a factor q",
+                    r"-9\,\ln 10/\ln q",
+                    f"q = {rate:.3f}: {ceil(9 * log(10) / -log(rate))}",
+                ),
             ],
         ),
         Part(

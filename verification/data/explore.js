@@ -215,7 +215,7 @@ nd.onPage("explore", (figure) => {
     return (role, run, i) => {
       const k = friction.value, last = run.shown.length - 1;
       const best = data.bounds.map(({ name }, b) => [name, run.factors[b]]).filter(([, factor]) => factor !== null).sort((a, b) => a[1] - b[1])[0];
-      const rate = run.rate === null || run.outcome !== "converged" ? "" : `, each leaving ${number(run.rate)} of the error`;
+      const rate = run.rate === null || run.outcome !== "converged" ? "" : `, at the end a step leaves ${number(run.rate)} of the error`;
       const most = drawRuler(role, run, best);
       says.textContent = `theta = ${number(data.theta[theta.value])}, k = ${number(data.friction[k])}, Neumann body ${role.neumann} (${role.name}): ${ended(run)}${rate}. `
         + (best ? `For any loads a step leaves at most ${number(best[1])} of the error${most === null ? "" : `, so that at most ${most} steps are needed`}.` : "No bound says that a step contracts here.")

@@ -49,8 +49,8 @@ def _seen(finished: Run) -> str:
     if finished.observed_rate is None or finished.outcome == "stalled":
         return steps
     rate = near_one(finished.observed_rate.value)
-    says = f"{steps}, each leaving {rate} of the error"
-    return says if len(says) <= ONE_LINE else f"{steps}; a step leaves {rate}"
+    says = f"{steps}; at the end a step leaves {rate}"
+    return says if len(says) <= ONE_LINE else f"{steps}; at the end {rate} a step"
 
 
 def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
