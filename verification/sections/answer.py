@@ -63,13 +63,13 @@ def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
         return "see below"
     found = [bound for bound in bounds if bound.factor is not None]
     if not found and (allowed := _widest(bounds)) is not None:
-        return f"none at this theta: outside {interval(allowed.interval, allowed.interval_level)}"
+        return f"from constants: none, theta is outside {interval(allowed.interval, allowed.interval_level)}"
     if not found:
         limits = [bound.friction.some.value for bound in bounds if bound.friction.some is not None]
         varies = any(bound.friction.on == "multiple" for bound in bounds)
         what = "for less than {} times as much" if varies else "for k < {}"
-        reach = f"; some theta contracts {what.format(figures(max(limits)))}" if limits else ""
-        return f"none at this friction{reach}"
+        reach = f"; some theta contracts {what.format(figures(max(limits)))}" if limits else " at this friction"
+        return f"from constants: none{reach}"
     best = min(found, key=lambda bound: bound.factor.value if bound.factor is not None else 1.0)
     how = "in doubles" if best.level == "float" else best.level
     return f"at most {factor(best.factor, best.one_minus_factor)} of the error is left ({best.name}, {how})"
