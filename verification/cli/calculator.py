@@ -15,7 +15,6 @@ from verification.bounds.table import ENERGY, SECTION_5, Calculated
 from verification.cli.console import as_figure, complain, deliver
 from verification.cli.forms import cli
 from verification.cli.options import JSON, OneOf, one_file
-from verification.output.files import writing
 from verification.registry import BOUNDS
 from verification.sections.bounds import sections
 
@@ -90,6 +89,8 @@ def bounds(
     found = Calculated(constants=constants, energy=energy, theta=theta, results=results)
     if as_json and found.no_sum:  # which the screen says itself
         complain(f"warning: {found.no_sum}")
+    from verification.output.files import writing
+
     deliver(found, sections, as_json, writing(target, as_figure), target)
     proved = any(result.factor is not None and result.proved for result in results.values())
     return 1 if check and not proved else 0

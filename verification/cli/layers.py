@@ -11,7 +11,6 @@ from ndtheory import HypothesisError
 from verification.cli.console import as_figure, deliver
 from verification.cli.forms import cli
 from verification.cli.options import JSON, one_file
-from verification.output.files import writing
 
 
 @cli.command()
@@ -48,4 +47,6 @@ def layers(target: Path | None, as_json: bool, **given: Any) -> None:
         found = two_layers(**given)
     except HypothesisError as error:
         raise click.UsageError(f"--{error}") from None
+    from verification.output.files import writing
+
     deliver(found, Document.sections, as_json, writing(target, as_figure), target)

@@ -15,7 +15,6 @@ from verification.cli.forms import cli
 from verification.cli.options import BOUNDS, FILE, FOLDER, JOBS, JSON, PATH, STORE, SWAP, Typed, of_a_file, one_file
 from verification.cli.problems import load
 from verification.machine.interrupts import term_interrupts
-from verification.problem.tables import ProblemError, unreadable
 
 if TYPE_CHECKING:
     from verification.sweeps.sweep import Sweep
@@ -152,6 +151,7 @@ def _targets(
 def _write(found: Sweep, targets: dict[Path, Callable[[Sweep, Path], None]]) -> None:
     """Write each file; a figure that cannot be drawn is reported, and the others are written."""
     from verification.output.files import write_into
+    from verification.problem import ProblemError
 
     for path, write in targets.items():
         try:
@@ -164,6 +164,8 @@ def _write(found: Sweep, targets: dict[Path, Callable[[Sweep, Path], None]]) -> 
 
 def _check_log(log: Path, others: Sequence[Path]) -> None:
     """Raise ProblemError for a log that is neither new, nor empty, nor written by this command."""
+    from verification.problem import ProblemError
+
     needed = ""
     if not log.parent.is_dir():
         needed = "a name in a folder that exists"
@@ -176,6 +178,8 @@ def _check_log(log: Path, others: Sequence[Path]) -> None:
 
 
 def _is_log(path: Path) -> bool:
+    from verification.problem.tables import unreadable
+
     if unreadable(path, MOST_LOG_BYTES):
         return False
     with path.open("rb") as there:
