@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from numbers import Rational
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,10 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
 
 def whole_numbers(values: NDArray[Any]) -> tuple[NDArray[Any], int]:
     """Rationals as multiples of 1/unit, and that unit: whole numbers are faster than fractions."""
-    exact = [x.as_integer_ratio() for x in values.ravel().tolist()]
+    exact = [
+        (int(x.numerator), int(x.denominator)) if isinstance(x, Rational) else x.as_integer_ratio()
+        for x in values.ravel().tolist()
+    ]
     unit = math.lcm(*(denominator for _, denominator in exact))
     whole = np.array([numerator * (unit // denominator) for numerator, denominator in exact], dtype=object)
     return whole.reshape(values.shape), unit

@@ -1,11 +1,13 @@
 """How deep points lie inside an outline, against loops over angles and edges."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from fem1d2d import depths, rectangle
+from fem1d2d.outline import whole_numbers
 
 
 def ring(points):
@@ -64,3 +66,10 @@ def test_a_corner_is_not_deeper_than_rounding_in_its_own_outline_however_it_is_t
 
 def test_no_point_lies_in_no_outline():
     assert depths(np.empty((0, 2)), *HOLE).tolist() == []
+
+
+def test_exact_coordinates_may_be_any_rationals_and_floats():
+    values = np.array([Fraction(1, 3), 2, np.int64(5), 0.25], dtype=object)
+    whole, unit = whole_numbers(values)
+    assert [Fraction(x, unit) for x in whole.tolist()] == [Fraction(1, 3), 2, 5, Fraction(1, 4)]
+    assert {type(x) for x in whole.tolist()} == {int}

@@ -174,7 +174,9 @@ def _why_not(
     """Reason why a bound has no conclusion at a theta."""
     if interval is not None and theta is not None:
         return f"theta = {theta:g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
-    scale = threshold.value if threshold is not None else float("inf")
+    if threshold is None:
+        return f"friction {friction:g} is above what the bound allows"
+    scale = threshold.value
     if varies:
         return f"needed less than {scale / friction:.2g} times the friction along Gamma_c"
     return f"friction {friction:g} {'is at' if friction == scale else 'exceeds'} its limit {scale:.2g}"

@@ -51,9 +51,10 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
             f" {100 * max(gap, 0.0):.2f} % apart.  No proof can give less than the attained factor."
         )
     sets = "" if found.sets == 1 else f"The pieces of T are divided into {found.sets} sets, each with its own form.  "
-    proposed = registry.BOUNDS[found.edition].words
+    words = registry.BOUNDS[found.edition].words
+    proposed = words[:1].upper() + words[1:]
     proof = (
-        f"{sets}{proposed.capitalize()} proposes multipliers.  With them the quadratic form of the proof is positive"
+        f"{sets}{proposed} proposes multipliers.  With them the quadratic form of the proof is positive"
         f" definite for the exact rational data, which {found.claim['bits']}-bit interval arithmetic proves."
     )
     then = following("certify", "-o", "certificate.json", iteration=True)

@@ -249,10 +249,10 @@ def drawn_in(
 def least_ratio(over: tuple[Any, Any, Any], under: tuple[Any, Any, Any]) -> Floats:
     """The least ratio of two quadratic polynomials in Bernstein's form (ends, middle) on [0, 1], the second one > 0."""
     with np.errstate(all="ignore"):
-        (f, g, m), (p, q, r) = over, under
+        f, g, m, p, q, r = np.broadcast_arrays(*over, *under)
         best = np.asarray(np.minimum(np.where(p > 0, f / p, np.where(f < 0, -np.inf, np.inf)), g / q))
         inner = ~((r > 0) & (m / r >= best))  # elsewhere an end is the least: the ratio is a mean of the three
-        f, g, m, p, q, r = (np.broadcast_to(each, best.shape)[inner] for each in (f, g, m, p, q, r))
+        f, g, m, p, q, r = (each[inner] for each in (f, g, m, p, q, r))
         a, b, c = g * r - m * q, g * p - f * q, m * p - f * r  # of its derivative, in t = u/(1 - u)
         half = -(b + np.copysign(np.sqrt(np.maximum(b**2 - 4 * a * c, 0)), b)) / 2
         for t in (half / a, c / half):

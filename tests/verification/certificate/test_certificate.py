@@ -21,7 +21,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.bounds.bound import Subject
 from verification.certificate import check, claims
-from verification.certificate.claims import FEWEST, LEFT, Claims, NoCertificate, describe
+from verification.certificate.claims import FEWEST, LEFT, MARGINS, Claims, NoCertificate, describe
 from verification.certificate.contraction import certify, check_again
 from verification.machine.progress import silent
 from verification.registry import BOUNDS
@@ -330,3 +330,29 @@ def test_where_no_contraction_is_proved_there_is_no_certificate():
         certify(vf.Problem.from_dict(small()), edition="repaired")
     with pytest.raises(vf.ProblemError, match="outside the theorem"):
         certify(vf.Problem.from_dict(small(contact={"law": "local", "radius": None})))
+
+
+@pytest.mark.parametrize(
+    ("needed", "tried"),
+    [
+        ({1e-10: 128}, [(128, 1e-10)]),
+        ({1e-6: 128}, [(128, 1e-10), (128, 1e-8), (128, 1e-6)]),
+        ({1e-10: 192, 1e-2: 128}, [(128, 1e-10), (128, 1e-8), (128, 1e-6), (192, 1e-10)]),
+        ({1e-2: 192}, [(128, 1e-10), (128, 1e-8), (128, 1e-6), *((192, margin) for margin in MARGINS)]),
+    ],
+)
+def test_sharp_margins_are_tried_before_more_bits_and_weak_ones_after_them(monkeypatch, needed, tried):
+    """A checker that accepts a margin from so many bits on: 1 minus the factor is 1/2 in doubles."""
+    seen = []
+
+    def fake(discrete, claim, eliminated):
+        margin = min(MARGINS, key=lambda one: abs(1 - Fraction(claim["factor"]) - Fraction(1, 2) * (1 - Fraction(one))))
+        seen.append((claim["bits"], margin))
+        if claim["bits"] < needed.get(margin, 10**6):
+            raise ValueError("too wide")
+
+    monkeypatch.setattr(claims, "check", fake)
+    found = Claims({}, silent)
+    monkeypatch.setitem(vars(found), "bits", 128)
+    assert (found.confirmed(Fraction(1, 2), 0.5, {}) is not None) == any(seen[-1][1] == one for one in needed)
+    assert seen == tried
