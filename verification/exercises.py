@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import json
 import math
+from fractions import Fraction
 from importlib.resources import files
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from ndtheory.number import exact
+from ndtheory.texts import did_you_mean
+from verification.bounds.verdicts import RunVerdict
 
 #: Relative difference of a number that counts as right: three digits, as pages print them.
 THREE_DIGITS = 0.005
+
+#: Significant digits from which on a rounded number may be called right as far as it goes; one digit is no evidence.
+TWO_DIGITS = 2
+
+VERDICTS = get_args(RunVerdict)
 
 
 def check(exercise: str, answer: Any) -> str:
@@ -23,17 +31,13 @@ def check(exercise: str, answer: Any) -> str:
     exercise : str
         Page and number, as they are below the exercise.
     answer : number, str or sequence of them
-        What the line below the exercise lists, in its order; numbers to three digits, or fractions as ``"2/3"``.
+        What the line below the exercise lists, in its order; numbers to three digits, or ``"2/3"``, or ``"pi/2"``.
 
     Returns
     -------
     str
-        A hint explains all parts of the answer that are not right.
-
-    Raises
-    ------
-    ValueError
-        The exercise has no check (the message lists those that have one), or the answer has another number of parts.
+        A hint explains all parts of the answer that are not right. If the exercise has no check, or the answer another
+        number of parts or no numbers, the text says what is needed.
 
     Examples
     --------
@@ -45,32 +49,53 @@ def check(exercise: str, answer: Any) -> str:
     known = json.loads((files("verification") / "data" / "exercises.json").read_text("utf-8"))
     exercise = str(exercise)
     if exercise not in known:
-        raise ValueError(f"{exercise} has no check; these exercises have one: {', '.join(known)}")
+        page = [name for name in known if name.partition(".")[0] == exercise.partition(".")[0]]
+        one = f"; these exercises have one: {', '.join(page or known)}"
+        return f"{exercise} has no check{(page and one) or did_you_mean(exercise, known) or one}"
     asks, right, wrong = known[exercise].values()
     given = np.array(answer, dtype=object).ravel()
     if len(given) != len(right):
-        raise ValueError(f"{exercise}: needed {asks}, {len(right)} in all; received {answer!r}")
+        return f"{exercise}: needed {asks}, {len(right)} in all; received {answer!r}"
+    try:
+        return _checked(given, asks, right, wrong)
+    except ValueError as error:
+        return str(error)
+
+
+def _checked(given: np.ndarray, asks: str, right: list[Any], wrong: dict[str, list[Any]]) -> str:
     off = [n for n, part in enumerate(given) if not _same(part, right[n])]
     if not off:
         return "right"
     hints = [hint for hint, numbers in wrong.items() if all(_same(given[n], numbers[n]) for n in off)]
     if not hints and all(_rounded(given[n], right[n]) for n in off):
-        return "Right as far as it goes; give three digits."
+        typed = (str(given[n]).lower().partition("e")[0].replace(".", "") for n in off)
+        enough = all(len(digits.lstrip("+-0")) >= TWO_DIGITS for digits in typed)
+        return "Right as far as it goes; give three digits." if enough else "Give three digits."
     if all(any(_same(part, of) for part in given) for of in right):
         hints += [f"These are the right answers in another order; needed {asks}."]
     return " ".join([f"Not yet{f', number {off[0] + 1}' * (len(right) > 1)}.", *hints[:1]])
 
 
 def _same(part: Any, of: Any) -> bool:
-    if isinstance(of, str):
-        return str(part).strip().upper() == of
+    if not isinstance(of, str):
+        return math.isclose(_number(part), of, rel_tol=THREE_DIGITS)
+    if (word := str(part).strip().upper()) not in VERDICTS:
+        raise ValueError(f"{part!r} is not a verdict; needed {', '.join(VERDICTS[:-1])} or {VERDICTS[-1]}")
+    return word == of
+
+
+def _number(part: Any) -> Fraction:
+    """A number exactly as it was typed; with pi as a factor too, as ``"3*pi/4"``."""
+    factor, pi, divisor = str(part).replace(" ", "").partition("pi")
     try:
-        return math.isclose(exact(part), of, rel_tol=THREE_DIGITS)
+        if pi and divisor[:1] in ("", "/"):
+            return exact(factor.rstrip("*") or 1) * exact(f"1{divisor}") * Fraction(math.pi)
+        return exact(part)
     except ValueError as error:
-        raise ValueError(f"{error}; needed a number such as 1.571 or '2/3'") from None
+        raise ValueError(f"{error}; needed a number such as 1.571, '2/3' or 'pi/2'") from None
 
 
 def _rounded(part: Any, of: Any) -> bool:
     """True if a number is another one rounded to the digits that are given."""
     digits = len(str(part).partition(".")[2])
-    return not isinstance(of, str) and 0 != exact(part) == exact(f"{of:.{digits}f}")
+    return not isinstance(of, str) and 0 != _number(part) == exact(f"{of:.{digits}f}")

@@ -142,6 +142,11 @@ def ends_of(t1: float, q1: float, t2: float, q2: float, less: float = 1) -> Numb
     return low - less, high - less, 2 / (low + high)
 
 
+def by_hand(rho: float, a: float, b: float) -> Numbers:
+    """k_s and k_e of the single node."""
+    return energy_norms.friction_multiple(a, b), energy_norms.friction_limit(rho, a, b)
+
+
 def half_way() -> tuple[float, int, int]:
     """The rate that the run of the page forecasts, the step at which it does, and the step of its end."""
     forecast = pressed().linearise().forecast
@@ -227,7 +232,14 @@ EXERCISES = {
     "open_or_closed.1": Exercise(
         "theta, and its factor",
         lambda low, high: (energy_norms.tied_theta(low, high), energy_norms.tied_rate(low, high)), normal_ends,
-        {TIED: lambda low, high: (energy_norms.predicted_theta(high), energy_norms.predicted_rate(high))},
+        {TIED: lambda low, high: (energy_norms.predicted_theta(high), energy_norms.predicted_rate(high)),
+         "Is that the factor of an open node? All nodes stay closed.": lambda low, high: (
+             energy_norms.tied_theta(low, high), 1 - energy_norms.tied_theta(low, high)),
+         "Is the 1 of 1 + lambda there, for both ends?": lambda low, high: (
+             2 / (low + high), (high - low) / (high + low)),
+         "This makes the factor of the largest lambda 0. What becomes of the smallest?": lambda low, high: (
+             1 / (1 + high), (high - low) / (1 + high)),
+         "This is the limit, where the factor of the largest lambda is -1.": lambda low, high: (2 / (1 + high), 1.0)},
     ),
     "open_or_closed.2": Exercise(
         "the ratio of the steps for rho = 1, and its limit for large rho", lambda *rho: [cost(x) for x in rho],
@@ -267,7 +279,10 @@ EXERCISES = {
     "which_side.1": Exercise(
         "E1/E2", lambda lower, upper: [math.sqrt(lower / upper)],
         lambda: measured("section6", "rho_max", 1, 2, cells=((20, 3), (12, 3)), young=(20000, 20000)),
-        {OTHER_BODY: lambda lower, upper: [math.sqrt(upper / lower)], ROOT: lambda lower, upper: [lower / upper]},
+        {OTHER_BODY: lambda lower, upper: [math.sqrt(upper / lower)], ROOT: lambda lower, upper: [lower / upper],
+         "Have the plates the same shape? Compare both rho at equal moduli.": lambda lower, upper: [1.0],
+         "This is rho of the lower body. At which ratio is it that of the upper one?": lambda lower, upper: [lower],
+         "This is rho of the upper body. At which ratio is it that of the lower one?": lambda lower, upper: [upper]},
     ),
     "which_side.2": Exercise(
         "the least rho for the mode of the largest eigenvalue, and for the smallest", readings, lambda: [0.5, 0.45],
@@ -309,20 +324,30 @@ EXERCISES = {
     "printed_theorem.3": Exercise(
         "the decades gained, and those left of the bar", lambda won, bar: (won, bar - won),
         lambda: [math.log10(constants().M / constants().m), bar()],
-        {"Does the estimate enter the bound squared?": lambda won, bar: (won / 2, bar - won / 2)},
+        {"Does the estimate enter the bound squared?": lambda won, bar: (won / 2, bar - won / 2),
+         "The figure rounds its bars. All digits are in losses.friction.": lambda won, bar: (won, round(bar, 1) - won)},
     ),
     "friction.1": Exercise(
         "k_s and k_e",
-        lambda rho, a, b: (energy_norms.friction_multiple(a, b), energy_norms.friction_limit(rho, a, b)),
-        lambda: (1.0, math.sqrt(2), 1.0),
-        {ROOT: lambda rho, a, b: (
-            energy_norms.friction_multiple(a**2, b**2), energy_norms.friction_limit(rho, a**2, b**2)),
+        by_hand, lambda: (1.0, math.sqrt(2), 1.0),
+        {ROOT: lambda rho, a, b: by_hand(rho, a**2, b**2),
          "Did you exchange the bodies of C_t1 and C_t2?":
-         lambda rho, a, b: (energy_norms.friction_multiple(b, a), energy_norms.friction_limit(rho, b, a))},
+         lambda rho, a, b: by_hand(rho, b, a),
+         "The entry of S_n is the square of C_s. Did you take its root?":
+         lambda rho, a, b: by_hand(rho, math.sqrt(2) * a, math.sqrt(2) * b),
+         "Is C_s from the contact body? It belongs to the Neumann body.":
+         lambda rho, a, b: by_hand(rho, math.sqrt(2 / 3) * a, math.sqrt(2 / 3) * b),
+         "Are C_t1 and C_t2 from S? They are from its inverse.":
+         lambda rho, a, b: by_hand(rho, math.sqrt(4 / 3) * a, 2 * b),
+         "Is rho the largest eigenvalue of S_c alone? It is that of S_c against S_n.":
+         lambda rho, a, b: by_hand(2 * rho, a, b)},
     ),
     "friction.2": Exercise(
         "the k from which there are three", lambda slip: [(3 * slip - 1) / (slip - 3)], lambda: [12],
         {"This is necessary only. Does the slip have the right direction?": lambda slip: [3.0],
+         "Does the normal force give no tangential jump? F_TN is not 0.": lambda slip: [3 * slip / (slip - 3)],
+         "Is the sign of F_TN right?": lambda slip: [(3 * slip + 1) / (slip - 3)],
+         "Is F the inverse of S_c alone? The Neumann body belongs to it.": lambda slip: [2.0],
          "This is k_e, below which there is one solution.": lambda slip: [
              energy_norms.friction_limit(1.0, math.sqrt(2), 1.0)]},
     ),
@@ -356,7 +381,15 @@ EXERCISES = {
         {"Does the residual still have to fall by nine decades? It has fallen by half of them.": lambda rate, made, end:
          (math.ceil(-9 / math.log10(rate)), made + math.ceil(-9 / math.log10(rate))),
          "Are these counted from the start? The run is at the step of the forecast.": lambda rate, made, end:
-         (end, made + end)},
+         (end, made + end),
+         "Is this a natural logarithm? 4.5 counts powers of ten.": lambda rate, made, end:
+         (math.ceil(-4.5 / math.log(rate)), made + math.ceil(-4.5 / math.log(rate))),
+         "Is it rounded up? A step is taken as a whole.": lambda rate, made, end:
+         (-4.5 / math.log10(rate), made - 4.5 / math.log10(rate)),
+         "Is it rounded down? The last step has to be taken too.": lambda rate, made, end:
+         (int(-4.5 / math.log10(rate)), made + int(-4.5 / math.log10(rate))),
+         "The second number is the step at which the run ends, from the start.": lambda rate, made, end:
+         (end - made, end - made)},
     ),
     "prediction.3": Exercise(
         "the least rho(J), its theta, and 2/(2+rho)", all_thetas, spectrum_of_step,
@@ -371,7 +404,11 @@ EXERCISES = {
          "Does the other reading of each log fit the other log?":
          lambda t1, q1, t2, q2: ((1 - q2) / t2 - 1, (1 + q1) / t1 - 1, 2 / ((1 - q2) / t2 + (1 + q1) / t1)),
          "Did you forget the 1 of 1 + lambda in theta?":
-         lambda *logs: (*ends_of(*logs)[:2], 2 / sum(ends_of(*logs)[:2]))},
+         lambda *logs: (*ends_of(*logs)[:2], 2 / sum(ends_of(*logs)[:2])),
+         "Is this 2/(2 + rho)? No node of bonded blocks opens.": lambda *logs: (
+             *ends_of(*logs)[:2], energy_norms.predicted_theta(ends_of(*logs)[1])),
+         "Is the softest mode the slowest in both logs?": lambda t1, q1, t2, q2: ends_of(t2, q2, t1, -q1),
+         "Is the stiffest mode the slowest in both logs?": lambda t1, q1, t2, q2: ends_of(t2, -q2, t1, q1)},
     ),
 }  # fmt: skip
 
