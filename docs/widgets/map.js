@@ -23,6 +23,7 @@
         : `it adds ${loss.decades.toFixed(1)}, and another inequality adds more.`])),
       reveal: () => `in MPa the unit of stress adds ${unitStep.decades.toFixed(1)}, although no inequality loses anything there. `
         + `Of the inequalities ${largest.label} loses most: ${largest.decades.toFixed(1)}.`,
+      show: () => centre(),
       draw,
     });
     const log = { ratio: Math.log10(own.ratio), k: Math.log10(own.k) };
@@ -118,10 +119,18 @@
     }
 
     nd.start(widget, figure);
-    const centre = () => {
-      const first = boxes["5.30"].getBoundingClientRect(), view = frame.getBoundingClientRect();
-      frame.scrollBy(first.left + first.width / 2 - view.left - view.width / 2, name === "map" ? first.top + first.height / 2 - view.top - view.height / 2 : 0);
-    };
+    // The boxes of the question in the middle of the frame, or after the answer the edge behind (5.30); where they do not
+    // fit, the bound (5.30).
+    const asked = ["5.30", ...Object.keys(steps).filter((edge) => edge.endsWith(" 5.30")).map((edge) => edge.split(" ")[0])];
+    function centre() {
+      const view = frame.getBoundingClientRect();
+      const off = (ids, start, end, size) => {
+        const places = ids.map((id) => boxes[id].getBoundingClientRect());
+        const [low, high] = [Math.min(...places.map((one) => one[start])), Math.max(...places.map((one) => one[end]))];
+        return (high - low <= size ? low + high : places[0][start] + places[0][end]) / 2 - view[start] - size / 2;
+      };
+      frame.scrollBy(off(asked, "left", "right", view.width), off(widget.revealed ? ["5.30", "5.31"] : asked, "top", "bottom", view.height));
+    }
     new ResizeObserver(centre).observe(frame);
     figure.addEventListener("zoomed", centre); // a deck makes its letters larger
     centre();

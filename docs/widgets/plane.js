@@ -74,7 +74,7 @@ nd.onPage("plane", (figure) => {
     if (close) chart.axes({ low: 0, high: 1, name: "theta" }, { low: 0, high: ZOOM, name: "friction k" });
     else chart.axes(X, Y);
     chart.clear();
-    legend.textContent = `Green: in energy norms. Blue: repaired. Dashed red: printed${widget.revealed ? " (dotted: in MPa)" : ""}.`;
+    legend.textContent = `Green: in energy norms. Blue: repaired. Dashed orange: printed${widget.revealed ? " (dotted: in MPa)" : ""}.`;
     const top = close ? ZOOM : HIGH, bottom = close ? 1e-9 : LOW;
     const kinds = [
       ["in energy norms", (at) => energy(c, at), { fill: nd.COLOURS.green, "fill-opacity": 0.35, stroke: nd.COLOURS.green }],
