@@ -24,7 +24,7 @@ orphan: true
 
 # {name}
 
-```{{eval-rst}}
+{calls}```{{eval-rst}}
 .. automodule:: {name}
    :{members}:
 ```

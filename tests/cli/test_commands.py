@@ -123,6 +123,9 @@ def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monke
     lines = answer.out.splitlines()
     assert lines[0].startswith(tomllib.loads(examples()[name])["title"])
     assert [line for line in lines if line in HEADINGS[command]] == HEADINGS[command]
+    assert [lines[i - 1] for i, line in enumerate(lines) if i and line in HEADINGS[command]] == [""] * len(
+        HEADINGS[command]
+    )
     assert lines[-1].startswith("Next: ndtheory ")
     assert len(lines) <= 46
     assert [line for line in lines if len(line) > 80] == []

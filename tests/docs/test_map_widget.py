@@ -239,13 +239,15 @@ def test_the_boxes_of_the_question_are_in_view_and_after_the_answer_the_edge_beh
     seen = """const frame = document.querySelector(`[data-widget=${arguments[0]}] .map-frame`);
         const view = frame.getBoundingClientRect();
         return arguments[1].every(id => { const box = frame.querySelector(`[data-id="${id}"]`).getBoundingClientRect();
-          return view.left <= box.left && box.right <= view.right && view.top <= box.top && box.bottom <= view.bottom })"""
+          return view.left <= box.left && box.right <= view.right && view.top <= box.top
+            && box.bottom <= view.bottom })"""
     ids = [one for one, to in STEPS if to == "5.30"] + ["5.30"]
     assert len(ids) == 5
     for name in MAPS:
         widget = frame(unanswered, name)
-        script = "arguments[0].querySelector('.map-frame').style.cssText = 'flex:none;width:720px;max-height:none;height:460px'"
-        unanswered.execute_script(script, widget)
+        size = "flex:none;width:720px;max-height:none;height:460px"
+        script = "arguments[0].querySelector('.map-frame').style.cssText = arguments[1]"
+        unanswered.execute_script(script, widget, size)
         unanswered.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
         assert unanswered.execute_script(seen, name, ids), name
         widget.find_elements("css selector", ".ask button")[-1].click()

@@ -201,18 +201,19 @@ def deliver(
     *,
     typing: Typing = nothing_typed,
     warnings: Sequence[str] = (),
+    after: str = "",
 ) -> None:
     """Show a result and its warnings, then write its files: an error while writing loses no result.
 
     ``as_json`` shows the document instead of its sections.  ``write`` writes into ``folder``, if given; ``typing``
-    completes the command to type next.
+    completes the command to type next; ``after`` is as in ``lines``.
     """
     text = document.to_json() if as_json else ""
     with part(needed=True):
         if as_json:
             say(text)
         else:
-            show(sections(document), typing)
+            show(sections(document), typing, after)
     warn(warnings, wide=as_json)
     if write is None:
         return

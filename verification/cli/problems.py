@@ -307,7 +307,7 @@ def _compare(
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch, parts or nullcontext():
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
     said = comparison.run.warnings[len(pair.warnings) :]
-    deliver(comparison, end, as_json, write, folder, typing=typed.command, warnings=said)
+    deliver(comparison, end, as_json, write, folder, typing=typed.command, warnings=said, after="answer")
     return _status_of_comparison(comparison, typed.swap)
 
 

@@ -35,7 +35,8 @@ AT_POINTS = "WHAT HAPPENS AT THE POINTS?"
 #: What the table of a run shows, and its figures.
 RATES = (
     "The rate by which one step multiplies the error in the long run, and the steps to the tolerance: forecast half "
-    "way, computed at the solution, and observed."
+    "way, computed at the solution, and observed. The steps of the linearisation are those that its rate alone takes "
+    "from the start; the forecast goes on from the residual of the run."
 )
 PICTURES = (
     ("residuals", "The residual step by step (points), and how each bound proves that it falls (lines)."),
@@ -97,7 +98,7 @@ def happened(finished: Run, *, alone: bool) -> Section:
         rows.append((name, near_one(made.rate), count(made.iterations), "prediction, not a bound"))
     if linear is not None:
         needed = count(steps(linear.rate, problem.iteration.tolerance))
-        rows.append(("linearised at the solution", near_one(linear.rate), needed, "computed after the run"))
+        rows.append(("linearised at the solution", near_one(linear.rate), needed, "after the run, by rate alone"))
     seen: Cell = NONE if rate is None else near_one(rate.value)
     if finished.outcome == "stalled":
         seen = NONE  # no rate of convergence

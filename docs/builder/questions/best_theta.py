@@ -74,8 +74,8 @@ def data() -> dict[str, Any]:
     return widget(
         question="The plates of Section 6 have 7 contact nodes here. "
         f"In the norm (5.21) the best proved theta is {first['energy'][0]:.2f} at k = {BEFORE} and "
-        f"{asked['energy'][0]:.2f} at k = {ASKED}: the dark orange curves are the factors of one step. If the proof may choose "
-        f"the norm, where is the best theta at k = {ASKED}?",
+        f"{asked['energy'][0]:.2f} at k = {ASKED}: the dark orange curves are the factors of one step. If the proof "
+        f"may choose the norm, where is the best theta at k = {ASKED}?",
         answers=[others[1], others[0], right],
         right=right,
         wrong={
