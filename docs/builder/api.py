@@ -30,6 +30,9 @@ orphan: true
 ```
 """
 
+#: On the page of ``verification``, whose names are in its modules.
+BY_TASK = "{doc}`/api/index` lists its public names by task, and {doc}`/generated/modules` all modules.\n\n"
+
 HEAD = """# All modules
 
 Every module of the three packages has a page with its functions and classes. {doc}`/architecture` says which of them
@@ -118,7 +121,10 @@ def sentence(path: Path) -> str:
 def pages(found: dict[str, Path]) -> dict[str, str]:
     """The page of each module, by its name: a package shows its text, a module also its members."""
     members = {True: "no-members", False: "members"}
-    return {name: PAGE.format(name=name, members=members[path.name == "__init__.py"]) for name, path in found.items()}
+    return {
+        name: PAGE.format(name=name, members=members[path.name == "__init__.py"], calls=BY_TASK * (name == vf.__name__))
+        for name, path in found.items()
+    }
 
 
 def index(found: dict[str, Path]) -> str:

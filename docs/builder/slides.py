@@ -29,6 +29,8 @@ MARK = re.compile(r"slide(?: (\d+))?")
 NONE, NOT_THIS = "no slide", "not on a slide"
 
 SENTENCE = re.compile(r"[.?!](?=\s|$)|:$")
+#: A section that opens with a false claim or a bad idea in italics.
+WRONG = "A wrong turn"
 LINES = 22  # of a listing on one slide: more would have letters too small for the back of a hall
 LONGEST = 240  # characters of the first sentences, where there is more than one
 
@@ -211,6 +213,8 @@ def cut(page: nodes.document) -> Iterator[Slide]:
                 own.append([block])
         own.sort(key=lambda one: found.index(one[0]) if one[0] in found else -1)
         for i, one in enumerate(own):
+            if section[0].astext() == WRONG and not i:
+                one = [labelled(one[0]), *one[1:]]
             *kept, last = one
             last, *rest = in_parts(last)
             for shown in ([*kept, last], *([part] for part in rest)):
@@ -220,6 +224,15 @@ def cut(page: nodes.document) -> Iterator[Slide]:
         for slide in filter(None, map(exercise, found)):
             slide.anchor = section["ids"][0]
             yield slide
+
+
+def labelled(block: nodes.Node) -> nodes.Node:
+    """A paragraph; if it opens with italics, which the page refutes, with a class for which ``deck.css`` says so."""
+    if not (isinstance(block, nodes.paragraph) and isinstance(block[0], nodes.emphasis)):
+        return block
+    block = block.deepcopy()
+    block["classes"].append("wrong")
+    return block
 
 
 def found_on(slide: Slide, target: str) -> bool:

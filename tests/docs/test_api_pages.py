@@ -21,6 +21,9 @@ def test_a_page_shows_the_members_of_its_module(builder):
     assert ".. automodule:: a.b\n   :members:" in pages["a.b"]
     assert ".. automodule:: a\n   :no-members:" in pages["a"]
     assert all(page.startswith("---\norphan: true\n---\n") for page in pages.values())
+    assert not any("{doc}" in page for page in pages.values())
+    (page,) = builder.api.pages({"verification": Path("verification/__init__.py")}).values()
+    assert "{doc}`/api/index`" in page
 
 
 def test_the_list_has_each_module_once_with_its_first_sentence(builder):

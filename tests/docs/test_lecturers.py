@@ -28,6 +28,12 @@ def test_the_plan_for_a_lecture_adds_up_to_90_minutes() -> None:
     assert len(plan()) == 10
 
 
+def test_the_plan_is_a_table_whose_rows_are_stacked_on_a_phone() -> None:
+    inside = re.search(r"^:::\{container\} keys plan\n(.*?)^:::$", LECTURERS, re.DOTALL | re.MULTILINE)
+    assert inside is not None and inside[1].count("\n|") == len(plan()) + 1
+    assert "div.keys.plan td" in (ROOT / "docs" / "site.css").read_text("utf-8")
+
+
 def test_the_short_plan_adds_up_to_45_minutes() -> None:
     short = re.search(r"With 45 minutes, take (.*)", LECTURERS)
     assert short is not None

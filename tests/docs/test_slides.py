@@ -128,7 +128,7 @@ It is not on a slide.
 
 $$ y = 1 $$ (eq-line)
 
-## Marked
+## A wrong turn
 
 A section with a paragraph and a list that are marked, and no other of its parts.
 
@@ -136,7 +136,7 @@ $$ z = 1 $$
 
 % slide 2
 
-The whole paragraph. LONG
+*The whole* paragraph. LONG
 
 - The list.
 
@@ -173,8 +173,8 @@ SAID = [
     "A theorem It is true. Theorem (Small) Then \\(K &lt; 1\\) .",
     f"A long listing A file: {' '.join(f'line {n}' for n in range(22))}",
     f"A long listing {' '.join(f'line {n}' for n in range(22, 30))}",
-    f"Marked The whole paragraph. {LONG} The list.",
-    "Marked The last slide of the section.",
+    f"A wrong turn The whole paragraph. {LONG} The list.",
+    "A wrong turn The last slide of the section.",
     "Exercise 1: try Do it. (5 min)",
 ]
 
@@ -207,6 +207,8 @@ def test_slides_have_titles_first_sentences_formulas_figures_widgets_and_exercis
         text = re.sub(r"<a class=\"headerlink.*?</a>", "", re.sub(r"<img[^>]*>", "[picture]", text))
         said.append(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text)).replace(" ,", ",").strip())
     assert said == SAID
+    wrong = re.findall(r'<p class="wrong">(?:<[^>]+>)*([^<]+)', (small / "first-slides.html").read_text("utf-8"))
+    assert wrong == ["The whole"]  # and not what the page says itself
 
 
 def test_links_of_slides_lead_to_the_page(small):
