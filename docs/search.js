@@ -55,7 +55,7 @@
     return SEARCH.pages[known.reduce((a, b) => (a.length > b.length ? a : b))];
   };
 
-  const pagesOf = (query) => {
+  const pagesOf = (query, typed) => {
     const { docnames, filenames, titles, alltitles } = Search._index;
     const phrases = docnames.map((name, file) => [{ kind: "title", stems: stems(titles[file]), anchor: "" }]);
     for (const [title, places] of Object.entries(alltitles))
@@ -73,7 +73,8 @@
       const inText = (one) => (one.files.has(file) ? one.share : 0);
       const { score, chosen } = scored(query, phrases[file], inText, weightOf(name));
       const title = chosen?.title ? `${titles[file]} > ${chosen.title}` : titles[file];
-      return [name, title, chosen?.anchor ?? "", null, score, filenames[file], SearchResultKind.text];
+      const exact = (SEARCH.words[name] ?? []).some((phrase) => phrase.toLowerCase() === typed) ? 2 : 1;
+      return [name, title, chosen?.anchor ?? "", excerptOf(name), exact * score, filenames[file], SearchResultKind.text];
     });
   };
 
@@ -89,8 +90,10 @@
       return [page, name, `#${anchor}`, `${kind}: ${meaning}`, exact * score, page, SearchResultKind.object];
     });
 
-  // From disk a browser fetches no page, so there is no summary to show.
-  if (location.protocol === "file:") DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
+  // From disk a browser fetches no page: the beginning of the page is shown in place of a summary.
+  const onDisk = location.protocol === "file:";
+  if (onDisk) DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
+  const excerptOf = (name) => (onDisk && SEARCH.excerpts[name]) || null;
 
   Search._performSearch = (text, _terms, _excluded, _highlighted, objectTerms) => {
     _removeChildren(document.getElementById("search-progress"));
@@ -98,7 +101,7 @@
     const typed = text.toLowerCase().trim();
     const entries = entriesOf(query, [typed, ...typed.split(/\s+/)]).filter((entry) => entry[4] > 0);
     const places = new Set(entries.map((entry) => entry[0] + entry[2]));
-    const others = pagesOf(query);
+    const others = pagesOf(query, typed);
     for (const word of objectTerms)
       for (const object of Search.performObjectSearch(word, objectTerms))
         others.push([...object.slice(0, 4), object[4] / 100, ...object.slice(5)]); // after all others

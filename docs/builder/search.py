@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -99,10 +100,38 @@ def entries(source: Path) -> list[Entry]:
     return [*keys(), *typed(), *names(), *numbered(), *terms(glossary)]
 
 
+#: The title of a page, cells and directives, the beginnings of other blocks that are no text, and links and emphasis.
+TITLE = re.compile(r"^# .*\n", re.MULTILINE)
+FENCED = re.compile(r"^(```+|:::+).*?^\1$", re.DOTALL | re.MULTILINE)
+NO_TEXT = re.compile(r"[:%|({#<!$-]|\*\{\{")
+MARKS = re.compile(r"\{[\w:]+\}`(?:([^`<]+?) ?<[^`]*>|([^`]*))`|\[([^\]]+)\]\([^)]*\)|\*")
+
+#: Characters of an excerpt, which ends with a word.
+EXCERPT = 200
+
+
+def excerpts(source: Path) -> dict[str, str]:
+    """The beginning of each page that is written by hand: from disk a browser fetches no page to find a better one."""
+    found = {}
+    for path in sorted(source.rglob("*.md")):
+        name = path.relative_to(source).with_suffix("").as_posix()
+        below = TITLE.split(path.read_text("utf-8"), maxsplit=1)[1:]
+        blocks = (
+            re.split(r"\n{2,}", FENCED.sub("", below[0]).strip())
+            if below and not name.startswith(("_build", "generated"))
+            else []
+        )
+        text = next((block for block in blocks if not NO_TEXT.match(block)), "")
+        text = words(MARKS.sub(r"\1\2\3", text))
+        if text:
+            found[name] = textwrap.shorten(text, EXCERPT, placeholder=" ...")
+    return found
+
+
 def script(source: Path) -> str:
     """The script of the search page: the data, then what orders by them."""
     table = tomllib.loads((HERE / "search.toml").read_text("utf-8"))
-    data = json.dumps({**table, "entries": entries(source)}, ensure_ascii=False)
+    data = json.dumps({**table, "entries": entries(source), "excerpts": excerpts(source)}, ensure_ascii=False)
     return f"const SEARCH = {data};\n{(source / 'search.js').read_text('utf-8')}"
 
 

@@ -30,7 +30,8 @@ def test_the_plan_for_a_lecture_adds_up_to_90_minutes() -> None:
 
 def test_the_plan_is_a_table_whose_rows_are_stacked_on_a_phone() -> None:
     inside = re.search(r"^:::\{container\} keys plan\n(.*?)^:::$", LECTURERS, re.DOTALL | re.MULTILINE)
-    assert inside is not None and inside[1].count("\n|") == len(plan()) + 1
+    assert inside is not None
+    assert inside[1].count("\n|") == len(plan()) + 1
     assert "div.keys.plan td" in (ROOT / "docs" / "site.css").read_text("utf-8")
 
 

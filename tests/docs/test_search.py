@@ -65,6 +65,8 @@ QUERIES = {
     "vf.march": "generated/api/verification.algorithm.history",
     "teach a course": "lecturers",
     "what is rho": "glossary",
+    "stiffness ratio": "glossary#term-rho",
+    "which theta": "coupling",
     "nearly incompressible": "problem_file",
 }
 
@@ -123,6 +125,18 @@ def test_each_key_command_option_and_name_is_an_entry_with_a_meaning(builder):
     assert sorted(of("term")) == sorted(" ".join(term.split()) for term in listed)
 
 
+def test_each_page_has_an_excerpt_of_text_for_a_site_that_is_read_from_disk(builder):
+    found = builder.search.excerpts(DOCS)
+    assert {"index", "coupling", "first_run", "examples/which_side", "api/index"} <= set(found)
+    assert not any(name.startswith(("_build", "generated")) for name in found)
+    assert max(map(len, found.values())) <= 200
+    assert sum(map(len, found.values())) < 20_000
+    assert [name for name, text in found.items() if re.search(r"[`*]|\{\w+\}|\]\(|DOES IT", text)] == []
+    assert found["examples/prediction"].startswith(
+        "Before a run a bound guarantees that each step reduces the error by"
+    )
+
+
 def test_the_tables_of_the_search_name_pages_and_kinds_that_exist(builder):
     tables = tomllib.loads((DOCS / "builder" / "search.toml").read_text("utf-8"))
     made = ["generated/commands", "generated/api/ndtheory", "generated/errata"]
@@ -171,6 +185,7 @@ TABLES = {
     "pages": {"": 1, "theory": 0.5},
     "kinds": {"key": 1.3, "option": 0.8, "term": 1.4},
     "words": {"waves": ["hysteresis"], "theory": ["does not converge"], "file#key-load": ["gravity"]},
+    "excerpts": {"waves": "How waves carry stress."},
     "entries": [
         ["body.load", "file#key-load", "force on a side", "key"],
         ["contact.gap", "file#key-gap", "distance of the surfaces", "key"],
@@ -239,6 +254,7 @@ def test_the_first_result_has_the_words_of_the_query(searched, query, first):
 @needs_browser
 def test_an_entry_shows_its_kind_and_meaning_and_objects_come_last(searched):
     assert ("file.html#key-load", "body.load (key: force on a side)") in searched("load")
+    assert searched("hysteresis")[0] == ("waves.html", "Waves (How waves carry stress.)")  # the page itself, from disk
     assert [place for place, _ in searched("norm")] == ["waves.html", "theory.html", "theory.html#ours.module.norm"]
 
 
