@@ -17,9 +17,6 @@ from verification.bounds.verdicts import RunVerdict
 #: Relative difference of a number that counts as right: three digits, as pages print them.
 THREE_DIGITS = 0.005
 
-#: Significant digits from which on a rounded number may be called right as far as it goes; one digit is no evidence.
-TWO_DIGITS = 2
-
 VERDICTS = get_args(RunVerdict)
 
 
@@ -49,9 +46,9 @@ def check(exercise: str, answer: Any) -> str:
     known = json.loads((files("verification") / "data" / "exercises.json").read_text("utf-8"))
     exercise = str(exercise)
     if exercise not in known:
-        page = [name for name in known if name.partition(".")[0] == exercise.partition(".")[0]]
-        one = f"; these exercises have one: {', '.join(page or known)}"
-        return f"{exercise} has no check{(page and one) or did_you_mean(exercise, known) or one}"
+        page = [name for name in known if name.startswith(exercise[:-1])]
+        meant = "" if page else did_you_mean(exercise, known)
+        return f"{exercise} has no check{meant or '; these exercises have one: ' + ', '.join(page or known)}"
     asks, right, wrong = known[exercise].values()
     given = np.array(answer, dtype=object).ravel()
     if len(given) != len(right):
@@ -67,10 +64,8 @@ def _checked(given: np.ndarray, asks: str, right: list[Any], wrong: dict[str, li
     if not off:
         return "right"
     hints = [hint for hint, numbers in wrong.items() if all(_same(given[n], numbers[n]) for n in off)]
-    if not hints and all(_rounded(given[n], right[n]) for n in off):
-        typed = (str(given[n]).lower().partition("e")[0].replace(".", "") for n in off)
-        enough = all(len(digits.lstrip("+-0")) >= TWO_DIGITS for digits in typed)
-        return "Right as far as it goes; give three digits." if enough else "Give three digits."
+    if not hints and (digits := min(_rounded(given[n], right[n]) for n in off)):  # one digit is no evidence
+        return "Right as far as it goes; give three digits." if digits > 1 else "Give three digits."
     if all(any(_same(part, of) for part in given) for of in right):
         hints += [f"These are the right answers in another order; needed {asks}."]
     return " ".join([f"Not yet{f', number {off[0] + 1}' * (len(right) > 1)}.", *hints[:1]])
@@ -95,7 +90,7 @@ def _number(part: Any) -> Fraction:
         raise ValueError(f"{error}; needed a number such as 1.571, '2/3' or 'pi/2'") from None
 
 
-def _rounded(part: Any, of: Any) -> bool:
-    """True if a number is another one rounded to the digits that are given."""
-    digits = len(str(part).partition(".")[2])
-    return not isinstance(of, str) and 0 != _number(part) == exact(f"{of:.{digits}f}")
+def _rounded(part: Any, of: Any) -> int:
+    """Significant digits of a number if it is another one, rounded to the digits that are given; else 0."""
+    text = of if isinstance(of, str) else f"{of:.{len(str(part).partition('.')[2])}f}"
+    return 0 if text == of or _number(part) != exact(text) else len(text.replace(".", "").lstrip("-0"))

@@ -98,7 +98,7 @@ def happened(finished: Run, *, alone: bool) -> Section:
         rows.append((name, near_one(made.rate), count(made.iterations), "prediction, not a bound"))
     if linear is not None:
         needed = count(steps(linear.rate, problem.iteration.tolerance))
-        rows.append(("linearised at the solution", near_one(linear.rate), needed, "after the run, by rate alone"))
+        rows.append(("linearised at the solution", near_one(linear.rate), needed, "after the run, by its rate"))
     seen: Cell = NONE if rate is None else near_one(rate.value)
     if finished.outcome == "stalled":
         seen = NONE  # no rate of convergence
