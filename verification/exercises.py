@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from fractions import Fraction
 from importlib.resources import files
 from typing import Any, get_args
@@ -11,7 +12,7 @@ from typing import Any, get_args
 import numpy as np
 
 from ndtheory.number import exact
-from ndtheory.texts import did_you_mean
+from ndtheory.texts import nearest
 from verification.bounds.verdicts import RunVerdict
 
 #: Relative difference of a number that counts as right: three digits, as pages print them.
@@ -46,27 +47,23 @@ def check(exercise: str, answer: Any) -> str:
     known = json.loads((files("verification") / "data" / "exercises.json").read_text("utf-8"))
     exercise = str(exercise)
     if exercise not in known:
-        page = [name for name in known if name.startswith(exercise[:-1])]
-        meant = "" if page else did_you_mean(exercise, known)
-        return f"{exercise} has no check{meant or '; these exercises have one: ' + ', '.join(page or known)}"
+        near = [name for name in known if name.startswith(exercise[:-1])] or nearest(exercise, known) or known
+        return f"{exercise} has no check; these exercises have one: {', '.join(near)}"
     asks, right, wrong = known[exercise].values()
     given = np.array(answer, dtype=object).ravel()
     if len(given) != len(right):
         return f"{exercise}: needed {asks}, {len(right)} in all; received {answer!r}"
     try:
-        return _checked(given, asks, right, wrong)
+        off = [n for n, part in enumerate(given) if not _same(part, right[n])]
+        hints = [hint for hint, numbers in wrong.items() if all(_same(given[n], numbers[n]) for n in off)]
+        shuffled = all(any(_same(part, of) for part in given) for of in right)
     except ValueError as error:
         return str(error)
-
-
-def _checked(given: np.ndarray, asks: str, right: list[Any], wrong: dict[str, list[Any]]) -> str:
-    off = [n for n, part in enumerate(given) if not _same(part, right[n])]
     if not off:
         return "right"
-    hints = [hint for hint, numbers in wrong.items() if all(_same(given[n], numbers[n]) for n in off)]
     if not hints and (digits := min(_rounded(given[n], right[n]) for n in off)):  # one digit is no evidence
         return "Right as far as it goes; give three digits." if digits > 1 else "Give three digits."
-    if all(any(_same(part, of) for part in given) for of in right):
+    if shuffled:
         hints += [f"These are the right answers in another order; needed {asks}."]
     return " ".join([f"Not yet{f', number {off[0] + 1}' * (len(right) > 1)}.", *hints[:1]])
 
@@ -75,17 +72,16 @@ def _same(part: Any, of: Any) -> bool:
     if not isinstance(of, str):
         return math.isclose(_number(part), of, rel_tol=THREE_DIGITS)
     if (word := str(part).strip().upper()) not in VERDICTS:
-        raise ValueError(f"{part!r} is not a verdict; needed {', '.join(VERDICTS[:-1])} or {VERDICTS[-1]}")
+        raise ValueError(f"{part!r} is not a verdict; needed some of {', '.join(VERDICTS)}")
     return word == of
 
 
 def _number(part: Any) -> Fraction:
     """A number exactly as it was typed; with pi as a factor too, as ``"3*pi/4"``."""
-    factor, pi, divisor = str(part).replace(" ", "").partition("pi")
+    text = str(part)
+    rational = re.sub(r" *\* *pi\b", "", re.sub(r"^ *pi\b", "1*pi", text), count=1)
     try:
-        if pi and divisor[:1] in ("", "/"):
-            return exact(factor.rstrip("*") or 1) * exact(f"1{divisor}") * Fraction(math.pi)
-        return exact(part)
+        return exact(rational) * Fraction(1 if rational == text else math.pi)
     except ValueError as error:
         raise ValueError(f"{error}; needed a number such as 1.571, '2/3' or 'pi/2'") from None
 

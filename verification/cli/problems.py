@@ -84,7 +84,9 @@ def example(name: str | None, inputs: Path | None, as_json: bool) -> None:
         found, shown = Examples(written=written), [f"{file}: {what}" for file, what in written.items()]
         shown.append(f"\nNext: ndtheory compare {quote(str(inputs / 'my.toml'))}")
     elif name is None:
-        titles = {key: _title(text) for key, text in available.items()}
+        import tomllib
+
+        titles = {key: str(tomllib.loads(text)["title"]) for key, text in available.items()}
         found, shown = Examples(examples=titles), [f"  {key:14}  {title}" for key, title in titles.items()]
         shown.append("\nNext: ndtheory example section6 > ex.toml; ndtheory compare ex.toml")
     elif name in available:
@@ -94,12 +96,6 @@ def example(name: str | None, inputs: Path | None, as_json: bool) -> None:
 
         raise click.UsageError(unknown_example(name, available))
     say(found.to_json() if as_json else "\n".join(shown))
-
-
-def _title(text: str) -> str:
-    import tomllib
-
-    return str(tomllib.loads(text)["title"])
 
 
 def load_problem(

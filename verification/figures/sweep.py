@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -39,7 +38,11 @@ def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figur
     colours = sweep.values([curves] if curves else others)
     lines = sweep.values([*([curves] if curves else []), *others])
     points = {
-        key: sorted((row[x], row[y]) for row in rows if row[x] is not None and _drawn(row[y]))
+        key: sorted(
+            (row[x], row[y])
+            for row in rows
+            if row[x] is not None and isinstance(row[y], (int, float)) and np.isfinite(row[y])
+        )
         for key, rows in lines.items()
     }
     if not any(points.values()):
@@ -50,7 +53,8 @@ def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figur
         shades = mpl.colormaps["viridis"](np.linspace(0, DARK, max(len(colours), 1)))
         for i, (key, shade) in enumerate(zip(colours, shades, strict=True)):
             label: str | None = ", ".join(
-                f"{name} = {_text(value)}" for name, value in zip([curves] if curves else others, key, strict=True)
+                f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}"
+                for name, value in zip([curves] if curves else others, key, strict=True)
             )
             for line, pairs in points.items():
                 if line[: len(key)] == key and pairs:
@@ -62,14 +66,6 @@ def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figur
         if any(key for key in colours):
             legend_beside(ax)
     return figure
-
-
-def _drawn(value: Any) -> bool:
-    return isinstance(value, (int, float)) and bool(np.isfinite(value))
-
-
-def _text(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def draw_rules(panels: Mapping[str, Sequence[Row]]) -> Figure:

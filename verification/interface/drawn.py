@@ -171,19 +171,15 @@ def _facing(bodies: Sequence[Drawn], pair: tuple[int, int]) -> Iterator[Touch]:
         (low, high), (bottom, top) = ((points.min(axis=0), points.max(axis=0)) for points in boxes)
         apart = np.maximum(low, bottom) - np.minimum(high, top)
         near = np.linalg.norm(np.maximum(apart, 0.0)) <= NEAR * size
-        order = _finer_first(lines) if len(bodies) == 2 else (1, 2)  # of more the colours give the roles
+        # of two, the body with shorter edges along the contact gets its grid; of more the colours give the roles
+        edges = [float(np.median(np.concatenate([np.diff(line.s) for line in of]))) for of in lines]
+        order = (1, 2) if len(bodies) != 2 or edges[0] <= edges[1] * (1 + SAME) else (2, 1)
         for contact in order if near else ():
             with suppress(MeshError):
                 touch = _touch(pair, surface, lines, contact, NEAR * size)
                 if -MOST_OVERLAP * size <= touch.gap <= NEAR * size:
                     yield touch
                     break
-
-
-def _finer_first(lines: tuple[list[Line], list[Line]]) -> tuple[int, int]:
-    """Return 1 and 2, first the body whose edges along the contact are shorter: it gets the contact grid."""
-    one, other = (float(np.median(np.concatenate([np.diff(line.s) for line in of]))) for of in lines)
-    return (1, 2) if one <= other * (1 + SAME) else (2, 1)
 
 
 def _touch(

@@ -95,7 +95,8 @@ def _along_x(problem: Problem, meshes: list[Mesh | None], known: list[Supports |
     """Join two surfaces over a part of the x axis, with vertical normals."""
     size = max(extent(mesh) for mesh in meshes if mesh is not None)
     contact = problem.contact_body - 1
-    chosen = _interval(problem)
+    given = problem.contact.interval
+    chosen = None if given is None else (float(given[0]), float(given[1]))
     nodes = _surfaces(problem, meshes, chosen)
     if problem.dimension == 2:
         if chosen is not None and (mesh := meshes[contact]) is not None:
@@ -280,11 +281,6 @@ def _supported(known: list[Supports | None], nodes: list[Ints]) -> list[Support]
         held, moved = (None, None) if body is None else (np.any(part[own], axis=1) for part in (body.held, body.values))
         found.append(None if held is None or moved is None else (held, held & ~moved))
     return found
-
-
-def _interval(problem: Problem) -> Ends | None:
-    chosen = problem.contact.interval
-    return None if chosen is None else (float(chosen[0]), float(chosen[1]))
 
 
 def _surfaces(problem: Problem, meshes: list[Mesh | None], ends: Ends | None) -> list[Ints]:

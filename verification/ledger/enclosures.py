@@ -213,7 +213,7 @@ class Slides(Apart):
         assert kernel is not None
         zeta = kernel.times(self._force.block(np.arange(t, len(self.u)), np.arange(1)))
         signed = Enclosed(middle=piece.sign[:, None] * zeta.middle, radius=zeta.radius)
-        friction = _times(more * bodies.problem.contact.friction)
+        friction = Enclosed.rounded(np.array([[more * bodies.problem.contact.friction]], dtype=object))
         bound = bodies.proof.joint.weights.times(signed).times(friction)
         nothing = np.zeros((len(self.u) - t, 1))
         reaction = Enclosed(middle=np.vstack([bound.middle, nothing]), radius=np.vstack([bound.radius, nothing]))
@@ -240,10 +240,6 @@ def _turned(form: Between, side: Condensed) -> Between:
     """A form in the directions of the pair of bodies."""
     low, high = (Enclosed(middle=side.orient_form(X.middle), radius=X.radius) for X in form)
     return low, high
-
-
-def _times(factor: Fraction) -> Enclosed:
-    return Enclosed.rounded(np.array([[factor]], dtype=object))
 
 
 def _scalar(found: Enclosed) -> Interval:

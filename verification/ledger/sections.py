@@ -19,7 +19,10 @@ DEFINED = Note("What each verdict means: docs/glossary.md, under verdict.", 0)
 @registry.sections.register
 def sections(found: Ledger) -> Sections:
     """The sections: a summary if every statement is there, else one for each row."""
-    return _summary(found) if found.whole else _rows(found)
+    if found.whole:
+        return _summary(found)
+    grounds = list(dict.fromkeys(id for row in found.rows for id in row.statement.leans_on))
+    return (*map(_row, found.rows), closing("", DEFINED, then=" ".join(["ndtheory verify", *grounds[:4]])))
 
 
 def _summary(found: Ledger) -> Sections:
@@ -43,11 +46,6 @@ def _summary(found: Ledger) -> Sections:
         sections.append(section("changed", "WHAT HAS CHANGED?", table(("statement", "recorded", "now"), changed)))
     claims = "that a numerical row is proved, or a proof of the statements that it uses"
     return (*sections, closing(claims, DEFINED, then="ndtheory verify 5.30"))
-
-
-def _rows(found: Ledger) -> Sections:
-    grounds = list(dict.fromkeys(id for row in found.rows for id in row.statement.leans_on))
-    return (*map(_row, found.rows), closing("", DEFINED, then=" ".join(["ndtheory verify", *grounds[:4]])))
 
 
 def _row(row: Finding) -> Section:

@@ -124,7 +124,8 @@ def _entry(row: Finding) -> Iterable[str]:
         yield f"*{s.fault.capitalize()}*{inherited}. {s.wrong}{mended}"
     yield ""
     for e in row.evidence:
-        yield f"- *{e.method}*, {e.of}, {outcome(e)}: {_shown(e)}"
+        text = f"`{e.text}`" if e.method in ("symbolic", "dimension") else e.text  # formulas as code
+        yield f"- *{e.method}*, {e.of}, {outcome(e)}: {text}{_counterexample(e)}"
     if s.note:
         yield ""
         yield s.note
@@ -137,12 +138,6 @@ def outcome(evidence: Evidence) -> str:
     """Outcome of a piece of evidence, in words."""
     only = " only in readings that depart from the text" if evidence.data.get("departs") else ""
     return OUTCOME[evidence.holds] + only
-
-
-def _shown(evidence: Evidence) -> str:
-    """The text of a piece of evidence with its formulas as code, and its exact counterexample."""
-    text = f"`{evidence.text}`" if evidence.method in ("symbolic", "dimension") else evidence.text
-    return text + _counterexample(evidence)
 
 
 def _counterexample(evidence: Evidence) -> str:

@@ -46,16 +46,12 @@ def colours(touching: Touching) -> list[tuple[set[int], set[int]]]:
                     way[other] = [*way[body], other]
                     group.append(other)
                 elif len(way[other]) % 2 == len(way[body]) % 2:
-                    raise OddRing(_ring(way[body], way[other]))
+                    start, end = way[body], way[other]  # which part where the ring begins
+                    common = sum(a == b for a, b in zip(start, end, strict=False))
+                    raise OddRing(start[common - 1 :] + end[common:][::-1])
         even = {body for body in group if len(way[body]) % 2 == 0}
         found.append((set(group) - even, even))
     return found
-
-
-def _ring(one: list[int], other: list[int]) -> list[int]:
-    """Return the ring of two ways from one body to two neighbours."""
-    common = sum(a == b for a, b in zip(one, other, strict=False))
-    return one[common - 1 :] + other[common:][::-1]
 
 
 def neumann_bodies(touching: Touching, held: Container[int], supported: Container[int]) -> set[int]:

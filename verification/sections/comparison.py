@@ -24,7 +24,6 @@ from verification.sections.run import happened, remedied, then
 from verification.sections.setting import limits, setting
 from verification.show.numbers import count, factor, marked, near_one
 from verification.show.parts import (
-    Cell,
     Labelled,
     Note,
     Quantity,
@@ -193,7 +192,8 @@ def proofs(result: Comparison) -> Sections:
                 without.setdefault(WORDS[verdict.verdict], []).append(name)
             continue
         says = marked("contracts", bound.level) if bound.proved else "claims contraction"
-        rows.append((name, says, factor(bound.factor, bound.one_minus_factor), _most(steps), WORDS[verdict.verdict]))
+        most = count(steps, "<= ") if steps is None or steps < 1e6 else Quantity(steps, f"<= {steps:.1e}")
+        rows.append((name, says, factor(bound.factor, bound.one_minus_factor), most, WORDS[verdict.verdict]))
     parts: list[Shown] = []
     for words, names in without.items():
         why = f"{'; '.join(names)}: {result.verdicts[names[-1]].reason}"  # each has another reason
@@ -208,11 +208,6 @@ def proofs(result: Comparison) -> Sections:
     room = len(rows) + len(parts) - bool(rows) < MOST_BOUNDS
     more = [Note("All numbers: --full.", 0, only="terminal")] * room
     return section("answer", "", *parts), replace(end, parts=(*limit, *more, last))
-
-
-def _most(steps: int | None) -> Cell:
-    """The steps that a bound promises; a power of ten where they are many."""
-    return count(steps, "<= ") if steps is None or steps < 1e6 else Quantity(steps, f"<= {steps:.1e}")
 
 
 def verdicts(result: Comparison) -> Sections:
