@@ -119,7 +119,8 @@ class Advice(Document):
         if other is not None:
             first += f", {_rho(other, tied)} with the roles exchanged"
         if tied and best.rho_min is not None:
-            first += f"; {least} is {best.rho_min.value:.3g}"
+            low = best.rho_min.value if best.spectrum is None else best.spectrum.low
+            first += f"; {least} is {low:.3g}"
         if self.next is not None and abs(self.theta - theta) > SAME_THETA * theta:
             return f"{first}. So relax by theta = {self.theta:.4g}: {self.next.why}."
         bound = "about " if best.level == "estimated" else "at most " * (tied or best.proved)

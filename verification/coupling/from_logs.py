@@ -412,13 +412,10 @@ def ends_in_words(boxes: Sequence[Box]) -> str:
 
 def cost_in_words(boxes: Sequence[Box], dear: float, kind: Kind) -> str:
     """The reason for a theta, in words."""
-    times = (
-        "the fewest steps" if dear < 1.05 else f"at most {math.ceil(10 * dear - 1e-9) / 10:g} times the fewest steps"
-    )
-    where = (
-        f"as the logs leave them{kind.given(' where contact does not change')}, with {ends.FEWEST_MODES} modes or more"
-    )
-    return f"{times} if {ends_in_words(boxes)}, {where}"
+    times = "" if dear < 1.05 else f"at most {math.ceil(10 * dear - 1e-9) / 10:g} times "
+    same = kind.given(" where contact does not change")
+    where = f"as the logs leave them{same}, with {ends.FEWEST_MODES} modes or more"
+    return f"{times}the fewest steps if {ends_in_words(boxes)}, {where}"
 
 
 def contrary(logs: Sequence[SeenLog], base: SeenLog, kind: Kind, why: str, how: str = "") -> Decision:

@@ -264,9 +264,7 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     kinds = ["real: the coupling looks symmetric" if seen.symmetric else f"complex: it is not symmetric{changes}"]
     if seen.changing and not seen.negative:
         bare = "nodes that are open bear no force in any, and have no error"
-        kinds.append(
-            f"contact changes between the iterates: {'a theta for open nodes as well' if seen.loaded else bare}"
-        )
+        kinds.append(f"contact changes between the iterates: {'a theta for open nodes too' if seen.loaded else bare}")
         if seen.used < seen.iterates:
             kinds.append(f"read from the last {seen.used}, in which the same nodes are open")
     said.append(f"eigenvalues are {'; '.join(kinds)}")
@@ -291,11 +289,10 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
     else:
         theta, rate = found.chosen(found.best)
         ends = "0, for open nodes, and largest" if seen.seen.low < spectrum.low else "least and largest"
-        formula = (
-            f"fewest steps to 1e-6 with {ends}" if spectrum.real else "the theta of least factor over the spectrum"
-        )
+        over = "the theta of least factor over"
+        formula = f"fewest steps to 1e-6 with {ends}" if spectrum.real else f"{over} the spectrum"
         if found.coupling.parallel:
-            formula = "1/(1 + largest)" if spectrum.low >= 0 else "the theta of least factor over both square roots"
+            formula = "1/(1 + largest)" if spectrum.low >= 0 else f"{over} both square roots"
         errors_of = "errors are estimates, for a linear T"
         if None in seen.estimated_errors:
             errors_of = "no error is known, as contact changes in these iterates, or friction acts"

@@ -268,9 +268,8 @@ class SeenLog(Part):
     def converges(self) -> bool:
         """True if every field that shows a ratio falls, and none stays at a level, however low."""
         ratio = self.slowest
-        return (
-            ratio is not None and ratio.most < 1 and not self.stays and not any(c.count("floor") for c in self.columns)
-        )
+        at_level = any(column.count("level", "plateau", "floor") for column in self.columns)
+        return ratio is not None and ratio.most < 1 and not at_level
 
     @property
     def diverges(self) -> bool:

@@ -76,6 +76,11 @@ class Spectrum(Value):
         return bool(np.abs(self.values.imag).max() <= REAL * (1 + abs(self.high)))
 
     @property
+    def unsure(self) -> bool:
+        """True if the error of the largest eigenvalue is larger than 1 + lambda itself."""
+        return self.error_high > 1 + abs(self.high)
+
+    @property
     def summary(self) -> str:
         return f"lambda from {self.low:.4g} to {self.high:.4g}, {self.source}"
 

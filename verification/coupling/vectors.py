@@ -198,7 +198,9 @@ class Vectors(Evidence, Value):
             causes = self.kind.given("friction, contact that changes, ") + MEMORY
             causes += ", a solver that is not linear, or convection (kind general)"
             return f"{odd.format(tops)}, as of no linear symmetric coupling: {causes}"
-        if len(self.course) > 1:
+        if self.spectrum.unsure:
+            said = f"rho seems to be {self.seen.high:.3g} with an error of {self.spectrum.error_high:.2g}"
+        elif len(self.course) > 1:
             said = f"rho changes with every iterate ({tops}), not found yet"
         return f"{said}; continue the run with IQN-ILS, and give more of its vectors"
 
@@ -227,7 +229,8 @@ class Vectors(Evidence, Value):
         said, causes = f"an eigenvalue seems to be {least:.3g}", self.kind.given("contact that changes, ") + WRONG_SIGN
         if self.kind.signed and self.ritz.real.max() < -REAL:
             return f"all eigenvalues seem to be negative, which these make: {causes}"
-        below_0 = self.kind.linear and least < -max(REAL / 2 * (1 + abs(self.spectrum.high)), self.error_low)
+        error = self.spectrum.error_low if self.spectrum.error_low <= 1 + least else 0.0  # a larger one is no excuse
+        below_0 = self.kind.linear and least < -max(REAL / 2 * (1 + abs(self.spectrum.high)), error)
         if self.kind.signed and (least <= RANK - 1 or below_0):
             return f"{said}, which these make: {causes}"
         if self.kind.parallel and not self.spectrum.parallel().theta:
@@ -309,7 +312,7 @@ def seen_in(
         noise=noise,
         apart=_apart(X, TX, inside),
         low_found=min(least) > 0 and (known[0] or steady([1 + 1 / one for one in least])),
-        high_found=(known[1] or steady(tops) or rises) and not unsymmetric(kind, spectrum, course),
+        high_found=(known[1] or steady(tops) or rises) and not (spectrum.unsure or unsymmetric(kind, spectrum, course)),
         course=course,
         loaded=loaded,
         period=_period(X),
@@ -326,7 +329,7 @@ def unsymmetric(kind: Kind, spectrum: Spectrum, course: Sequence[float]) -> str:
     if kind.signed and falls(course):
         return "more iterates show a smaller rho ({})"
     turns = spectrum.error_high < np.abs(spectrum.values.imag).max()
-    return "eigenvalues are complex" if kind.name == "tied" and turns and not (kind.parallel or spectrum.real) else ""
+    return "eigenvalues are complex" if kind.name == "tied" and turns and not spectrum.real else ""
 
 
 def _before(X: Floats, TX: Floats, inside: NDArray[np.bool_], directions: int, kind: Kind) -> list[Complex]:

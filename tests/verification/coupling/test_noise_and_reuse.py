@@ -1,6 +1,7 @@
 """Solvers with noise or a memory, seen by one iterate evaluated twice; changes of earlier steps in time used again."""
 
 import copy
+import itertools
 import pickle
 
 import numpy as np
@@ -137,6 +138,24 @@ def test_noise_that_makes_an_eigenvalue_below_0_is_named_as_a_cause():
     )
     assert found.advice.theta is None or found.advice.theta * 61 < 2
     assert found.advice.theta is not None or "noise" in found.advice.why_no_theta
+
+
+def test_parallel_eigenvalues_that_no_tied_coupling_has_leave_no_theta():
+    """Noise makes some that are negative, complex, or less exact than they are large; 1/(1 + 2.86) = 0.26 is best."""
+    values, without = np.geomspace(2.86, 0.05, 24), 0
+    Q = np.linalg.qr(np.random.default_rng(0).normal(size=(24, 24)))[0]
+    for seed, (tolerance, pair) in itertools.product(range(6), [(1e-2, False), (1e-2, True), (1e-6, True)]):
+        noise = np.random.default_rng(seed)
+        contact = lambda u, noise=noise: (1 - Q @ (values * (Q.T @ u))) * (1 + 1e-3 * noise.normal(size=24))
+        settings = {"start": np.zeros(24), "kind": "tied", "parallel": True, "max_iterations": 40}
+        advice = vf.couple(lambda g: g + 1, contact, tolerance=tolerance, twice=pair, **settings).advice
+        seen, without = advice.vectors, without + (advice.theta is None)
+        if advice.theta is not None:
+            assert 0.2 < advice.theta < 0.29
+            assert seen.error_high <= 1 + seen.spectrum.high
+            assert seen.spectrum.low > -0.02 * (1 + seen.spectrum.high) or seen.error_low <= 1 + seen.spectrum.low
+            assert f"{seen.spectrum.low:.3g}" in advice.quote  # as the table has it
+    assert 0 < without < 18
 
 
 def test_vectors_without_a_pair_ask_for_one():

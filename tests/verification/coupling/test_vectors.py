@@ -231,7 +231,7 @@ def test_contact_that_opens_and_closes_is_recognised():
     given[0][0] = given[0][0] + 1e-3 * np.abs(given[1][0]).max()
     loaded = vf.advise_vectors(*given)
     assert loaded.spectrum.low == 0  # a force where a node is open in the end has an error of its own
-    assert "open nodes as well" in str(loaded.sections())
+    assert "open nodes too" in str(loaded.sections())
 
 
 def test_four_iterates_after_contact_has_changed_are_enough_and_are_the_last_ones():
