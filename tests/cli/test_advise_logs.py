@@ -205,7 +205,7 @@ def test_a_log_that_decides_nothing_leads_to_vectors(call, tmp_path):
     log = precice(tmp_path / "a.log", [{"ResAbs(M:F)": [0.8**n for n in range(9)]}])
     said = " ".join(call("advise", "run", "--log", log, "--theta", "0.3").out.split())
     assert "A few vectors of a run decide more than its log: ndtheory advise vectors --help." in said
-    assert "Or begin with ten steps with theta = 1" in said
+    assert "Or begin with 16 rows of absolute residuals with theta = 1" in said
     again = " ".join(call("advise", "run", "--log", log, "--theta", "1").out.split())
     assert "Or begin" not in again
 

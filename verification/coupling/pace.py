@@ -22,6 +22,9 @@ STEADY = 0.03
 #: without friction, or tied, ``|T x - T y| <= |T x - x|`` in the norm (5.21): ``|T x|`` is ``|y|`` within this share.
 SMALL = 0.1
 
+#: Of a run that arrives so many steps of a relative residual need not be below SMALL, as its first one is 1 or so.
+FIRST = 2
+
 #: The residuals that are relative to a size which changes.
 RELATIVE = ("relative", "previous")
 
@@ -72,7 +75,7 @@ class Pace:
     largest; where it is lost in rounding or zero, the share of rounding.  The series is ``lost`` if it ends in inf or
     nan, has ``arrived`` if it ends in rounding or zero, a step after those that can be read, and ``adapts`` if it falls
     much faster than before after it rose: a constant factor does not do that.  Of a level that repeats itself
-    ``period`` is the number of steps after which it does.
+    ``period`` is the number of steps after which it does, and ``least`` the ratio by which it may still fall.
     """
 
     kind: Kind
@@ -132,7 +135,7 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
         height = min(height, share)
     grown = taken > 0 and values[0] < CONVERGED * values[-1]
     if height < CONVERGED or grown:  # no level: fewer steps show the ratio
-        steps = min(steps, max(FEWEST_STEPS, taken // 2))
+        steps = min(steps, max(FEWEST_STEPS - FIRST * relative, taken // 2))
     known: dict[str, Any] = {"length": len(residuals), "height": height, "arrived": arrived, "adapts": _adapts(values)}
     growth = values[-2:] / values[-3:-1] if taken > 1 and not relative else np.zeros(1)
     explodes = growth.min() > EXPLODES and values[-1] == values.max()
@@ -191,7 +194,8 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
             return before
         if before is not None and (kind == "floor" or before.grows):
             return replace(before, kind=kind)
-        return Pace(kind=kind, period=_period(logs[-lengths[-1] - 1 :]), **known)
+        stretch = logs[-lengths[-1] - 1 :]
+        return Pace(kind=kind, period=_period(stretch), least=_fall(stretch), **known)
     if before is not None and before.grows:
         return before
     if height < CONVERGED and (settles := _settling(tail, relative, limit, steps)) is not None:
@@ -256,6 +260,13 @@ def _plateau(tail: Floats, digits: float) -> dict[str, Any] | None:
     middle = float(np.median(tail))
     flat = float(tail.max() - tail.min()) <= FLAT * (middle - 1) + 2 * digits * middle
     return {"least": least, "value": middle, "most": most} if least > 1 and flat else None
+
+
+def _fall(logs: Floats) -> float:
+    """The least mean ratio that a stretch at a level may have, by three standard errors of both halves; 1 at most."""
+    first, last = np.array_split(logs, 2)
+    sure = 3 * math.hypot(first.std(), last.std()) / math.sqrt(len(last))
+    return math.exp(min(float(last.mean() - first.mean()) - sure, 0.0) / len(last))
 
 
 def _level(logs: Floats, spread: float, limit: float) -> bool:

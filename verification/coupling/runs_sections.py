@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from verification.coupling.accelerated import Accelerated
 from verification.coupling.advice import Advice
+from verification.coupling.pace import RELATIVE
 from verification.coupling.readings import RunReading
 from verification.coupling.runs import Logs, OneRun, Runs
 from verification.coupling.runs_with_friction import FrictionBounds
@@ -101,7 +102,8 @@ def of_logs(found: Logs) -> Sections:
     read = [_readings(found.readings)] if found.readings else []
     notes = [f"Aitken's {log.factors.says}." for log in found.accelerated if log.factors is not None]
     if not read and any(log.stays for log in found.logs):
-        notes.append("Nothing by itself: a level is about where theta begins to diverge, or where contact changes.")
+        changes = found.kind.given(", or where contact changes")
+        notes.append(f"Nothing by itself: a level is about where theta begins to diverge{changes}.")
     elif not read and found.logs:
         notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
     elif not read and not notes:
@@ -111,6 +113,8 @@ def of_logs(found: Logs) -> Sections:
         at = ", ".join(f"{float(log.theta):.4g}" for log in stuck)
         why = STUCK["friction" if found.rubs else "linear" if found.kind.linear else "contact"]
         notes.append(f"No progress with theta = {at}: {why}. IQN-ILS, another start or exchanged roles may.")
+        if all(column.residual in RELATIVE for log in stuck for column in log.columns):
+            notes.append("Relative residuals stay so too where the run grows, whose ratio only absolute ones show.")
     if found.logs and not found.decided and not found.next.kept:
         notes.append("A few vectors of a run decide more than its log: ndtheory advise vectors --help.")
     if found.interval.contradiction is not None:

@@ -45,7 +45,7 @@ FROM_BELOW = "no friction, or a tied interface"
 MORE_ACCURATE = ", a residual that stays at its level in a longer run too, and solvers that are more accurate than that"
 RATIOS_RISE = ", and a norm in which the coupling is symmetric, so that ratios only rise"
 TIED = "a tied interface"
-LINEAR = "a linear coupling with real eigenvalues"
+LINEAR = "a linear coupling with real eigenvalues, none below 0"
 FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
 
 _TOGETHER: dict[str, Any] = {
@@ -202,8 +202,8 @@ class SeenLog(Part):
 
     @property
     @means(
-        "over how many steps a ratio had to be steady; ten or half of the steps suffice where the residual fell below "
-        "1e-6 of its largest",
+        "over how many steps a ratio had to be steady; ten (eight if relative) or half of the steps suffice where the "
+        "residual fell below 1e-6 of its largest",
         name="steady_over",
         unit="1",
     )
@@ -348,8 +348,11 @@ def bounds(logs: Sequence[SeenLog], kind: Kind = CONTACT) -> tuple[list[LogBound
             lower.append(LogBound(value=rho(ratio.least, theta), log=log, says=says, assumes=assumes))
         if log.diverges:
             assumes = given(FROM_BELOW) + MORE_ACCURATE * log.stays
-            says = "its residual grows, or stays at a level"
-            lower.append(LogBound(value=2 / theta - 1, log=log, says=says, assumes=assumes))
+            says, value = "its residual grows, or stays at a level", 2 / theta - 1
+            left = [pace.least for pace in log.paces if pace.kind == "level" and pace.least is not None]
+            if kind.linear and left and min(left) < 1:
+                says, value = f"its residual falls by {few(min(left))} a step at most", rho(Fraction(min(left)), theta)
+            lower.append(LogBound(value=value, log=log, says=says, assumes=assumes))
         if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):
             says = f"the relative residual of relaxed data stays at {few(plateau.value)}"
             lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=given(TIED)))

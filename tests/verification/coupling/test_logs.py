@@ -11,6 +11,7 @@ from problem_list import changed
 from strategies import AT_NIGHT
 
 import verification as vf
+from verification.coupling import readings
 from verification.coupling.from_logs import advise_logs
 from verification.interface.pair import pair_from
 
@@ -19,6 +20,35 @@ def of(tmp_path, theta, modes=MODES, steps=120, name="run.log", column="ResAbs(S
     absolute, relative = linear_run(modes, theta, steps)
     series = relative if "Rel" in column else absolute
     return precice(tmp_path / name, [{column: series}]), repr(theta)
+
+
+@pytest.mark.parametrize("ratio", [0.27, 0.29, 0.31, 0.33])
+def test_a_swift_run_with_theta_1_is_read_alike_by_relative_and_by_absolute_residuals(tmp_path, ratio):
+    """Relative ones below 0.1 are two fewer; theta = 1 is not kept where a smaller one takes half of the steps."""
+    steps = 1 + math.ceil(math.log(1e-6) / math.log(ratio))
+    found = [
+        advise_logs([of(tmp_path, 1.0, (0.02, 0.1, ratio), steps, column=column)], tied=True)
+        for column in ("ResAbs(M:F)", "ResRel(M:F)")
+    ]
+    one, other = (advice.theta for advice in found)
+    assert one == pytest.approx(other, rel=0.02)
+    assert one < 0.9
+
+
+@pytest.mark.parametrize(
+    ("high", "column", "shows"), [(0.6, "Abs", 1), (0.6, "Rel", 1), (2.0, "Abs", 1), (2.0, "Rel", 0)]
+)
+def test_the_rows_with_theta_1_that_are_asked_for_show_the_ratio_but_relative_ones_no_growth(
+    tmp_path, high, column, shows
+):
+    log = of(tmp_path, 1.0, (0.1, 0.3, high), readings.ROWS, column=f"Res{column}(M:F)")
+    found = advise_logs([log], tied=True)
+    (seen,) = found.logs
+    assert (seen.slowest is not None) == shows
+    if shows:
+        assert float(seen.slowest.value) == pytest.approx(high, rel=0.02)
+    grows = "Relative residuals stay so too where the run grows"
+    assert (grows in str(found.sections())) == (not shows)
 
 
 # --- one log ---------------------------------------------------------------------------------------------------------

@@ -267,7 +267,7 @@ def test_after_a_level_of_parallel_coupling_a_quarter_comes_next(tmp_path):
 def test_theta_1_is_named_as_the_first_run_only_where_no_run_like_it_was_made_and_none_diverges(made, options):
     with tempfile.TemporaryDirectory() as folder:
         found = advised(Path(folder), made, **options)
-    named = found.next.why.count("Or begin with ten steps with theta = 1")
+    named = found.next.why.count("Or begin with 16 rows of absolute residuals with theta = 1")
     high, rises = any(float(theta) >= 0.9 for theta, _ in made), any(log.diverges for log in found.logs)
     decided = bool(found.roles) or found.next.kept
     assert named == (not (high or rises or decided or options.get("friction", False)))

@@ -279,3 +279,16 @@ def test_parallel_positive_feedback_has_a_document_while_rho_is_only_bounded(row
         X = np.cumsum(random.standard_normal((rows, 16)), axis=0)
         found = vf.advise_vectors(X, [T(x) for x in X], kind="general", parallel=True)
         assert found.to_json()
+
+
+@pytest.mark.parametrize("theta", [0.2, 0.22, 0.24, 0.26, 0.28])
+@pytest.mark.parametrize("count", [40, 60, 90])
+def test_relative_residuals_that_turn_and_still_fall_are_at_no_level(tmp_path, theta, count):
+    """rho is 6: theta converges below 2/7 = 0.2857, and residuals fall by 0.99 a step at 0.28."""
+    coupling = Solvers()
+    X, TX = coupling.rows(theta, count)
+    fields = zip(np.split(TX - X, 2, axis=1), np.split(TX, 2, axis=1), strict=True)
+    relative = [np.linalg.norm(r, axis=1) / np.linalg.norm(image, axis=1) for r, image in fields]
+    log = precice(tmp_path / "a.log", [dict(zip(("ResRel(M:F)", "ResRel(M:D)"), relative, strict=True))])
+    found = vf.advise_logs([(log, theta)], tied=True, parallel=True)
+    assert found.interval.lo is None or found.interval.lo.value <= 6.0
