@@ -360,7 +360,8 @@ def couple(
         True to call each solver with what the other one answered in the evaluation before, as if both ran at once.
         Force and displacement are relaxed together, and each must meet the tolerance.
     twice : bool
-        True to evaluate T at the start once more: that shows the noise of the solvers, and whether they have a memory.
+        True to evaluate T at the start once more, after the third evaluation: that shows the noise of the solvers, and
+        whether they have a memory.
     max_iterations : int
         Largest number of evaluations of T, with the additional one of ``twice``; fewer if the residual runs away.
     listen : callable, optional
@@ -391,14 +392,19 @@ def couple(
     max_iterations = int(take("max_iterations", max_iterations, "a whole number > 0", whole))
     ending = Ending(1.0, max_iterations - 1 - twice, patience=math.inf, growing=GROWING)
     seen, history, displacement = list[Evaluation](), list[float](), g
+    begin = np.concatenate([g, 0 * g]) if parallel else g
 
     def T(x: Floats) -> Floats:
         nonlocal displacement
         g, before = np.split(x, 2) if parallel else (x, None)
-        displacement = _answer("neumann", neumann, g, len(seen) + 1)
-        force = _answer("contact", contact, displacement if before is None else before, len(seen) + 1)
-        if seen and max(np.abs(force).max(), np.abs(displacement).max()) > FAR_AWAY:
+        moved = _answer("neumann", neumann, g, len(seen) + 1)
+        force = _answer("contact", contact, moved if before is None else before, len(seen) + 1)
+        if seen and max(np.abs(force).max(), np.abs(moved).max()) > FAR_AWAY:
             raise _RunAway
+        if twice and len(seen) == 2 and x is not begin:  # a memory has another x now, in parallel coupling too
+            coupling.see(begin, T(begin))
+            coupling._seen.insert(1, coupling._seen.pop())
+        displacement = moved
         return np.concatenate([force, displacement]) if parallel else force
 
     def ended(found: Evaluation) -> Outcome | None:
@@ -413,16 +419,13 @@ def couple(
                 return Outcome.INTERRUPTED
         return Outcome.DIVERGED if outcome is Outcome.LIMIT and _grows(seen) else outcome
 
-    begin = np.concatenate([g, 0 * g]) if parallel else g
-    if twice:
-        coupling.see(begin, T(begin))
     try:
         outcome = follow(evaluations(T, coupling.relaxed, begin), ended, seen)
     except _RunAway:
         outcome = Outcome.DIVERGED
     return Coupled(
         outcome=outcome,
-        iterations=len(seen) + twice,
+        iterations=len(seen) + (twice and len(seen) > 2),
         force=seen[-1].g[: len(g)],
         displacement=displacement,
         history=tuple(history),

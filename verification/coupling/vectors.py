@@ -443,11 +443,15 @@ def _accuracy(X: Floats, TX: Floats) -> float:
 
 
 def _apart(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> float | None:
-    """The largest distance of two images of one iterate, over the largest residual up to it; None without any."""
+    """The largest distance of two images of one iterate, over the largest residual up to it; None without any.
+
+    It is 0 where the images are the same up to their accuracy.
+    """
+    least = ROUNDING * _accuracy(X, TX) * float(np.abs(TX).max())
     same = np.flatnonzero(inside & (X[1:] == X[:-1]).all(axis=1))
     residuals = np.maximum.accumulate(np.linalg.norm(TX - X, axis=1))
-    shares = [float(np.linalg.norm(TX[i + 1] - TX[i]) / (residuals[i] or 1.0)) for i in same]
-    return max(shares, default=None)
+    shares = [float(np.linalg.norm(TX[i + 1] - TX[i])) / (residuals[i] or 1.0) for i in same]
+    return max((share * (share * residuals[i] > least) for share, i in zip(shares, same, strict=True)), default=None)
 
 
 def _period(X: Floats) -> int:
