@@ -94,8 +94,9 @@ class Vectors(Evidence, Value):
     FEWEST or more.  ``spectrum`` has ``ritz``, the Ritz values less 1, and modes between them; ``course`` is the
     largest lambda after fewer iterates, and after all; ``loaded`` is True where a node that is open in the last image
     bore a force in an iterate, so that its mode, lambda = 0, has a share in the error; ``period`` is the number of
-    steps after which iterates come back, 0 where they do not.  An end is found if it no longer changes with more
-    directions: the least one as the exchanged roles need it, in 1 + 1/lambda, and the largest one in 1 + lambda.
+    steps after which iterates come back, 0 where they do not; ``stays`` the size of the last residuals over |T x| where
+    noise keeps them from falling, else 0.  An end is found if it no longer changes with more directions: the least one
+    as the exchanged roles need it, in 1 + 1/lambda, and the largest one in 1 + lambda.
     """
 
     unknowns: int = key(_COUNTS, unit="1")
@@ -135,6 +136,7 @@ class Vectors(Evidence, Value):
     course: tuple[float, ...]
     loaded: bool
     period: int
+    stays: float = 0.0
 
     @cached_property
     def seen(self) -> Spectrum:
@@ -202,6 +204,10 @@ class Vectors(Evidence, Value):
             said = f"rho seems to be {self.seen.high:.3g} with an error of {self.spectrum.error_high:.2g}"
         elif len(self.course) > 1:
             said = f"rho changes with every iterate ({tops}), not found yet"
+        if self.stays:
+            return (
+                f"{said}; ask for a residual above {2 * self.stays:.1g}: the noise of the solvers keeps it from falling"
+            )
         return f"{said}; continue the run with IQN-ILS, and give more of its vectors"
 
     @property
@@ -274,6 +280,7 @@ def seen_in(
     ValueError
         The iterates, or their residuals, do not differ above rounding.
     """
+    stays = _stays(X, TX, 1 + kind.parallel)
     given, last = len(X), len(X) if kind.linear else last_piece(TX)
     changing, read = last < given, last if last >= FEWEST else given
     loaded = bool((at_zero(TX)[-1] & (bears(X, TX) | (bore is not None and bore))).any())
@@ -316,6 +323,7 @@ def seen_in(
         course=course,
         loaded=loaded,
         period=_period(X),
+        stays=stays if noise else 0.0,
     )
 
 
@@ -462,6 +470,19 @@ def _period(X: Floats) -> int:
         if step and apart.max() <= BACK:
             return p if apart[-1] <= max(apart[0] / 2, RETURNED) else 0
     return 0
+
+
+def _stays(X: Floats, TX: Floats, fields: int) -> float:
+    """The median of the last third of the residuals over |T x|, where it is hardly below the least one before.
+
+    Of several fields the larger one counts; 0 elsewhere, and of few iterates.
+    """
+    parts = zip(np.split(TX - X, fields, axis=1), np.split(TX, fields, axis=1), strict=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.max([np.linalg.norm(r, axis=1) / np.linalg.norm(image, axis=1) for r, image in parts], axis=0)
+    third = len(X) // 3
+    stays = float(np.median(shares[-third:]))
+    return stays if third >= FEWEST and 1.25 * stays >= np.nanmin(shares[:-third]) else 0.0
 
 
 def last_piece(TX: Floats) -> int:

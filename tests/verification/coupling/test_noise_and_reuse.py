@@ -183,6 +183,23 @@ def test_parallel_eigenvalues_that_no_tied_coupling_has_leave_no_theta():
     assert 0 < without < 18
 
 
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("noise", [1e-2, 1e-3])
+def test_a_residual_at_the_noise_leads_to_a_tolerance_above_it_and_not_to_more_iterates(noise, parallel):
+    """As long as it falls, more iterates are asked for."""
+    random, said = np.random.default_rng(1), set()
+    solver = lambda u: (1 - VALUES * (u - 1)) * (1 + noise * random.normal(size=12))
+    for tolerance in (1e-9, 30 * noise):
+        found = twice(solver, rule="iqn-ils", parallel=parallel, tolerance=tolerance, max_iterations=60)
+        why = found.advice.why_no_theta
+        stays = found.advice.vectors.stays
+        said |= {"ask for a residual above" in why}
+        assert (stays > 0) == (not found.converged)
+        assert not stays or noise / 10 < stays < 100 * noise
+        assert "continue the run" not in why or found.converged
+    assert True in said or parallel
+
+
 def test_vectors_without_a_pair_ask_for_one():
     X, TX = Linear([0.5, 2.0]).run("aitken", 0.3, 5)
     one = vf.advise_vectors(X, TX)
