@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -80,13 +80,13 @@ def _grids(transfer: Path, given: Mapping[str, Any]) -> dict[str, Any]:
 TIED = click.option("--tied", is_flag=True, help="Nothing opens or slips: tied bodies, heat, a fluid at a wall.")
 
 
-def of_kind(command: Callable[..., None]) -> Callable[..., None]:
-    """The options that say of which kind a coupling is, as one parameter ``kind``."""
+def of_kind(command: Callable[..., None], *, general: bool = True) -> Callable[..., None]:
+    """The options that say of which kind a coupling is, as one parameter ``kind``, ``general`` if that may be."""
 
     @click.option(
         "--kind",
-        type=OneOf(get_args(KindName)),
-        help="Kind of coupling: general may have positive feedback; by default contact.",
+        type=OneOf(get_args(KindName)[: 2 + general]),
+        help="Kind of coupling: " + "general may have positive feedback; " * general + "by default contact.",
     )
     @TIED
     @click.option("--parallel", is_flag=True, help="Parallel coupling: both solvers run at once.")
@@ -396,7 +396,7 @@ def _shape(context: click.Context, parameter: click.Parameter, value: str | None
     help="A fluid: length of the wall between its ends; of a tube, its length and its radius.",
 )
 @click.option("--dt", metavar="TIME", help="Heat with a capacity, or fluid: the step in time.")
-@of_kind
+@partial(of_kind, general=False)
 @JSON
 def moduli(shape: dict[str, Any], kind: Kind, as_json: bool, **given: str | None) -> None:
     """Bound rho from material data, before there is a mesh.

@@ -85,6 +85,11 @@ class Advice(Document):
         return self.evidence.linear
 
     @property
+    def declared(self) -> bool:
+        """True if the user says that nothing opens or slips, of solvers whose bodies have no numbers."""
+        return self.coupling.linear and self.best.neumann_body is None
+
+    @property
     @says(
         "the assumption under which runs are read: no friction or a tied interface, or friction with `--friction`",
         null="where no run was given",
@@ -109,7 +114,7 @@ class Advice(Document):
         of, least = "rho (the largest eigenvalue lambda)", "rho_min (the least)"
         if best.spectrum is not None and not best.spectrum.real:
             of, least = "the largest real part of the eigenvalues, which are complex,", "the least real part"
-        elif self.coupling.signed:
+        elif not self.declared:
             of = "rho (stiffness of contact body over Neumann body on the interface, at worst)"
             least = "rho_min (at best)"
         first += f"{of} is {_rho(best, tied)}"
@@ -125,7 +130,7 @@ class Advice(Document):
             return f"{first}. So relax by theta = {self.theta:.4g}: {self.next.why}."
         bound = "about " if best.level == "estimated" else "at most " * (tied or best.proved)
         then = f"So relax by {self._formula(best, theta)} = {theta:.3g}: {bound}{in_steps(rate)} to 1e-9"
-        linear = " if nothing opens or slips" if self.coupling.signed else " if the coupling is linear"
+        linear = " if the coupling is linear" if self.declared else " if nothing opens or slips"
         then += linear if tied else " without friction" if best.proved else " are predicted"
         if other is not None:
             away = in_steps(self.chosen(other)[1]).removesuffix(" steps")

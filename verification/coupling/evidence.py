@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import ClassVar, TypeVar
 
 from ndtheory.energy_norms import parallel_factor, parallel_theta
@@ -13,7 +14,7 @@ from verification.coupling import methods
 from verification.coupling.kinds import CONTACT, BodyNumber, Kind
 from verification.coupling.layers import RoleOfLayers
 from verification.coupling.methods import MethodRow
-from verification.coupling.readings import NextRun
+from verification.coupling.readings import NextRun, rounded_down
 from verification.coupling.roles import Role, estimated, fewer
 from verification.coupling.spectrum import Spectrum
 from verification.problem import Problem
@@ -115,7 +116,9 @@ class Evidence(Part, ABC):
         spectrum = spectrum if tied else spectrum.with_open_nodes()
         if theta is None:
             theta = self.chosen(role)[0] if self.kind.parallel else role.advised(tied=tied and role.ends is not None)[0]
-        return self.rows_on(spectrum, role.neumann_body, theta=min(theta, float(self.kind.most)), **settings)
+        return self.rows_on(
+            spectrum, role.neumann_body, theta=rounded_down(min(Fraction(theta), self.kind.most)), **settings
+        )
 
     def rows_on(
         self, spectrum: Spectrum, neumann_body: BodyNumber | None, *, theta: float | None = None, **settings: bool

@@ -100,6 +100,8 @@ def read_log(path: Path, pattern: str | None = None, *, name: str | None = None,
     text = _ANSI.sub("", _text(path))
     if not text.strip():
         raise _refused(path, "needed residuals, this file is empty")
+    if _PROBLEM.search(text):
+        raise _refused(path, f"needed a log, this is a problem file: ndtheory advise {path}")
     seconds = SECONDS + int(SECONDS_PER_CHARACTER * len(text))
     form = form or form_of(text, name)
     if form is not None and form.refused:
@@ -193,6 +195,7 @@ def _rounding(words: Sequence[str]) -> dict[str, float]:
 
 # --- lines ------------------------------------------------------------------------------------------------------------
 
+_PROBLEM = re.compile(r"^\s*(?:\[\s*body1\b|body1\s*[.=])", re.MULTILINE)
 _ANSI = re.compile(r"\x1b\[[0-9;]*m")
 
 

@@ -24,7 +24,8 @@ WIDEST = 300
 #: A number between blanks, and one after a word as programs name residuals.
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(?:[eE][-+]?\d+)?(?![\w.])")
 _RESIDUAL = re.compile(
-    r"(?P<before>(?:res|norm|err|diff|change).*?)(?<![\w.])[-+]?\d+\.\d+(?:e[-+]?\d+)?", re.IGNORECASE
+    r"(?P<before>\b(?:\w*(?:resid|norm|err|diff|change)|(?:\w*_)?res).*?)(?<![\w.])[-+]?\d+\.\d+(?:e[-+]?\d+)?",
+    re.IGNORECASE,
 )
 
 #: The groups that a pattern may name.

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from verification.coupling.advice import Advice
-from verification.coupling.readings import NextRun
+from verification.coupling.kinds import LARGEST_TO_PASTE
+from verification.coupling.readings import NextRun, rounded_down
 from verification.coupling.sections import next_run, of, pasted, pasted_for, reads, which_body, which_method
 from verification.coupling.seen_moduli import Corners, ElasticBodies, ModuliRole, excluded_from
 from verification.coupling.waves import Fluid, Heat, Waves
@@ -32,7 +33,7 @@ def _of_moduli(seen: ElasticBodies, found: Advice) -> Sections:
     started = [role for role in seen.roles if role.start is not None]
     first = seen.next_run()
     last = (pasted(seen.tried.neumann_body, first.theta),) if seen.tried.start else ()
-    then = f"ndtheory advise run --theta {first.theta:g} --ratio R (R: the ratio of that run)"
+    then = f"ndtheory advise run {seen.kind.typed}--theta {first.theta:g} --ratio R (R: the ratio of that run)"
     return (
         section("setting", "", Facts("", (*each, PLANES[seen.bodies[0].plane]))),
         _least_rho(seen),
@@ -120,9 +121,11 @@ def _of_heat(seen: Heat, found: Advice) -> Iterator[Section]:
     yield from _parallel(found, names)
     yield from which_method(found, names)
     relaxed = "Fluxes and temperatures are both relaxed." if found.parallel else "For temperatures the same."
-    yield pasted_for(found, None, relaxed, force="Heat-Flux")
+    yield pasted_for(found, None, relaxed, data=("Heat-Flux", "Temperature"))
     claims = "anything about plates that are not flat, or coarse meshes; the command below reads those"
-    yield closing(claims, then="ndtheory advise vectors X.npy TX.npy (iterates of a run: theta for your shapes)")
+    yield closing(
+        claims, then=f"ndtheory advise vectors {seen.kind.typed}X.npy TX.npy (iterates of a run: your shapes)"
+    )
 
 
 @of.register
@@ -135,7 +138,7 @@ def _of_fluid(seen: Fluid, found: Advice) -> Iterator[Section]:
     yield from _parallel(found, names)
     yield from which_method(found, names)
     yield next_run(seen.next_run())
-    then = f"ndtheory advise run --tied --theta {seen.next_run().theta:g} --ratio R"
+    then = f"ndtheory advise run {seen.kind.typed}--theta {seen.next_run().theta:g} --ratio R"
     yield closing("a bound of rho from above, or anything with a viscous or compressible fluid", then=then)
 
 
@@ -150,7 +153,8 @@ def _theta_of_heat(found: Advice, seen: Heat, names: Names) -> Section:
     possible = [role for role in found.roles if role.rho is not None]
     for role in possible:
         ends = figures(role.rho_min), figures(role.rho_tied)
-        best = figures(role.theta_tied), near_one(role.rate_tied or 0)
+        theta = rounded_down(min(role.theta_tied or 0, LARGEST_TO_PASTE))
+        best = figures(theta), near_one(role.factor_where_tied(theta) or 0)
         limit = None if role.rho_tied is None else excluded_from(role.rho_tied)
         rows.append((names[role.neumann_body or 2], *ends, *best, "never" if limit is None else figures(limit)))
     thick, dt = "thickness" not in seen.given, seen.one("dt")

@@ -104,6 +104,8 @@ def of_logs(found: Logs) -> Sections:
     if not read and any(log.stays for log in found.logs):
         changes = found.kind.given(", or where contact changes")
         notes.append(f"Nothing by itself: a level is about where theta begins to diverge{changes}.")
+    elif not read and any(log.slowest for log in found.logs):
+        notes.append("No reading of its own: the ratios are read together.")
     elif not read and found.logs:
         notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
     elif not read and not notes:

@@ -112,7 +112,7 @@ def paste_and_quote(found: Advice) -> Sections:
 
 def _end(found: Advice, then: Next | str) -> Section:
     """The limits of the advice, and the command to type next."""
-    claims = "that nothing opens or slips, or " * found.coupling.signed + "that the coupling is linear"
+    claims = "that nothing opens or slips, or " * (not found.declared) + "that the coupling is linear"
     claims = claims if found.tied else "that the predicted theta is the best one for other loads or meshes"
     return closing(claims, *map(outside_the_theorem, found.evidence.outside), then=then)
 
@@ -342,8 +342,8 @@ def _layers(found: Advice) -> Iterator[str]:
     """The prediction by layers without ends, in one line for both roles."""
     said = []
     for role in found.layers:
-        factor = "none below 1" if role.factor is None else near_one(role.factor.value)
-        of = f"factor {factor} at {figures(role.theta)}, k < {figures(role.friction_threshold)}"
+        factor = "no factor below 1" if role.factor is None else f"factor {near_one(role.factor.value)}"
+        of = f"{factor} at {figures(role.theta)}, k < {figures(role.friction_threshold)}"
         said.append(f"{name_of(found, role.neumann_body)}: {of}")
     if said:
         yield f"Predicted for endless layers, in a norm of a proof's choice: {'; '.join(said)}."
@@ -360,7 +360,8 @@ def _together(said: Mapping[str, str]) -> list[str]:
 def paste(found: Advice, *more: str) -> Section:
     """Lines to paste, and notes on them."""
     several = found.problem is not None and found.problem.several
-    said = [] if several else [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."]
+    blocks = not (several or found.coupling.parallel or (found.theta or 0) > 1)
+    said = [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."] * blocks
     auto = found.best.theta_auto
     if auto is not None and found.theta is not None:
         if found.theta == float(LARGEST_TO_PASTE) <= auto.theta:
@@ -380,14 +381,16 @@ def paste(found: Advice, *more: str) -> Section:
     return pasted_for(found, found.neumann_body, *said, *more)
 
 
-def pasted_for(found: Advice, neumann_body: BodyNumber | None, *notes: str, force: str = "Force") -> Section:
+def pasted_for(
+    found: Advice, neumann_body: BodyNumber | None, *notes: str, data: tuple[str, ...] = ("Force", "Displacement")
+) -> Section:
     """The lines of :func:`pasted` for the method that is advised in the roles of its theta."""
     assert found.theta is not None
     rule = [f"These are the roles as they are: {found.advised_exchanged}."] if found.advised_exchanged else []
     problem, method = found.problem, found.method_to_paste
     several = problem.numbers(neumann_body) if problem and problem.several and neumann_body else ()
-    file = problem is not None
-    return pasted(neumann_body, found.theta, *rule, *notes, method=method, file=file, force=force, several=several)
+    file, data = problem is not None, data if found.coupling.parallel else data[:1]
+    return pasted(neumann_body, found.theta, *rule, *notes, method=method, file=file, data=data, several=several)
 
 
 def snippets(found: Advice, library: str) -> Sections:
@@ -416,7 +419,7 @@ def pasted(
     *notes: str,
     method: str = "constant",
     file: bool = False,
-    force: str = "Force",
+    data: tuple[str, ...] = ("Force",),
     several: Sequence[int] = (),
 ) -> Section:
     """The lines for a problem file of two or of ``several`` bodies, and for preCICE, where relaxed data has a name."""
@@ -425,8 +428,8 @@ def pasted(
     lines.append(f"theta = {theta:g}")
     if file and method != "constant":
         lines.append(f'relaxation = "{method}"')
-    scheme = CouplingScheme(neumann_body=None if several else neumann_body, theta=theta, steps=None, force=force)
-    lines += precice_acceleration(scheme, method).split("\n")
+    scheme = CouplingScheme(neumann_body=None if several else neumann_body, theta=theta, steps=None, data=data)
+    lines += precice_acceleration(scheme, method).split("\n") if theta <= 1 else []
     return section("paste", "TO PASTE", Block(tuple(lines), 2), *notes)
 
 

@@ -26,14 +26,14 @@ class CouplingScheme:
     """Content of a snippet; the solver of the Neumann body reads forces and writes displacements.
 
     That body is None where advice is for the roles that a run had.  ``steps`` are to 1e-9 of the first error, by the
-    rate of the advice; ``force`` is the name of the relaxed data in preCICE.
+    rate of the advice; ``data`` are the names of the relaxed data in preCICE.
     """
 
     neumann_body: Literal[1, 2] | None
     theta: float
     steps: int | None
     tied: bool = False
-    force: str = "Force"
+    data: tuple[str, ...] = ("Force",)
 
     @property
     def neumann(self) -> str:
@@ -112,10 +112,10 @@ def precice(c: CouplingScheme, method: str) -> str:
 
 
 def precice_acceleration(c: CouplingScheme, method: str) -> str:
-    """The element of the acceleration; a rule that adapts its factor must name the forces."""
+    """The element of the acceleration; a rule that adapts its factor must name the data."""
     tag, factor = ACCELERATIONS[method]
-    data = "" if method == "constant" else f'\n  <data name="{c.force}" mesh="{c.neumann}-Mesh" />'
-    return f'<acceleration:{tag}><{factor} value="{c.theta:g}" />{data}</acceleration:{tag}>'
+    data = [f'\n  <data name="{name}" mesh="{c.neumann}-Mesh" />' for name in c.data if method != "constant"]
+    return f'<acceleration:{tag}><{factor} value="{c.theta:g}" />{"".join(data)}</acceleration:{tag}>'
 
 
 #: The convergence accelerators of Kratos, and their names of the factor, or of the first one and its upper limit.

@@ -65,7 +65,7 @@ def test_where_no_norm_is_found_the_reason_is_given():
         assert role["factor"] is None
         assert "no norm" in role["reason"]["factor"]
         assert role["friction_threshold"]["value"] < 9
-    assert "factor none below 1 at" in text(sections(found))
+    assert "no factor below 1 at" in text(sections(found))
 
 
 @pytest.mark.parametrize(
