@@ -371,13 +371,7 @@ class Advice(Document):
 
     @property
     def best(self) -> Role:
-        """The role that is advised, or the only one.
-
-        Raises
-        ------
-        ValueError
-            The ratio of a run has several readings: ``next`` is the run to make.
-        """
+        """The role that is advised, or the only one; ValueError where none is, as by several readings of a run."""
         if not self.roles:
             raise ValueError(self.why_no_theta)
         return next((r for r in self.roles if r.neumann_body == self.neumann_body), self.roles[0])

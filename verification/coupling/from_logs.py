@@ -91,15 +91,11 @@ def advise_logs(
     does not converge; a *relative* residual ``|T g - g|/|T g|`` that stays at P > 1 to a tied run that diverges with
     ``rho = 1/(P - 1)``.  A residual that is neither steady nor at a level shows nothing.
 
-    Without friction, or tied, ``rho >= (1 + r)/theta - 1`` wherever ``r > 1 - theta``, and ``rho >= 2/theta - 1`` if a
-    run does not converge.  If near the solution all of Gamma_c is closed and nothing slides, a run that converges also
-    has ``rho <= (1 + r)/theta - 1``.  Logs whose bounds exclude each other are reported as contradictory.
-    With friction no theta is pasted; :mod:`verification.coupling.runs_with_friction` has the bounds that are proved
-    then.
+    Logs whose bounds of rho exclude each other are reported as contradictory.  With friction no theta is pasted;
+    :mod:`verification.coupling.runs_with_friction` has the bounds that are proved then.
 
-    The theta to paste is predicted to take at most 1.4 times the fewest steps wherever the smallest and the largest
-    eigenvalue may lie by the logs (:mod:`verification.coupling.ends`); in contact it is not above the theta of a run
-    that converged.  Where a single log decides rho, the smallest eigenvalue is taken to be at most half of the largest.
+    The theta to paste is predicted to take at most 1.4 times the fewest steps wherever both ends of the spectrum may
+    lie by the logs (:mod:`verification.coupling.ends`); in contact it is not above the theta of a run that converged.
 
     :mod:`verification.coupling.accelerated` reads logs with Aitken's factors, and :mod:`verification.coupling.general`
     those of kind general; in *parallel* coupling the stiffest mode is the slowest in every log.
@@ -112,16 +108,14 @@ def advise_logs(
         Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1 (100 of
         kind general); None if the log names its factor, or if the relaxation was not constant.
     tied : bool
-        True if the interface is tied, so that nothing opens or slips.  A run is linear then, and the softest or the
-        stiffest mode sets its steady ratio: two logs mostly show both, and so the best theta,
-        ``2/(2 + lambda_min + rho)``.
+        True if the interface is tied, so that nothing opens or slips.
     friction : bool
         True if there is friction.  Otherwise the advice assumes that there is none, or that the interface is tied.
     pattern : str, optional
         A regular expression for logs of another form: its one group is a residual, or its groups are named
         ``residual``, ``iteration``, ``theta`` and ``omega``, a factor of Aitken.
     kind : {'contact', 'tied', 'general'}, optional
-        The kind of the coupling; ``tied`` is short for the second one.
+        ``tied`` is short for the second one.
     parallel : bool
         True if both solvers ran at once; the log should have the residuals of both fields.
     format : str, optional

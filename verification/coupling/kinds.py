@@ -71,13 +71,7 @@ class Kind:
         return kind + "--parallel " * self.parallel
 
     def assumes(self, friction: bool) -> str:
-        """The assumption under which runs of this kind are read.
-
-        Raises
-        ------
-        ValueError
-            Friction where nothing slips, or in parallel coupling; kind general in parallel coupling.
-        """
+        """The assumption under which runs of this kind are read; ValueError where there is no reading."""
         if friction and self.linear:
             raise ValueError(f"{self.name} with friction: needed one of them, as nothing slips on such an interface")
         if self.parallel and (friction or not self.signed):
@@ -95,10 +89,7 @@ class Kind:
 def kind_of(name: str | Kind | None = None, *, tied: bool = False, parallel: bool = False) -> Kind:
     """The kind of a coupling by its name, contact where there is none; ``tied`` is short for that name.
 
-    Raises
-    ------
-    ValueError
-        No kind has that name, or tied beside another one.
+    ValueError where no kind has the name, or tied is beside another one.
     """
     if isinstance(name, Kind):
         return name

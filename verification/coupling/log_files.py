@@ -84,14 +84,8 @@ class Log:
 def read_log(path: Path, pattern: str | None = None, *, name: str | None = None, log10: bool = False) -> Log:
     """Read the residuals in a log, by its form, by the name of a format, or by a regular expression.
 
-    With ``log10`` its numbers are decimal logarithms.
-
-    Raises
-    ------
-    ProblemError
-        No such log, or one that is damaged other than in its last line.
-    ValueError
-        A pattern that is none (:func:`verification.coupling.log_lines.form_of_pattern`), or no such format.
+    With ``log10`` its numbers are decimal logarithms.  ProblemError where there is no such log, or one that is damaged
+    other than in its last line; ValueError for a pattern that is none, and where there is no such format.
     """
     form = None if pattern is None else form_of_pattern(pattern)
     why = unreadable(path, MOST_BYTES)

@@ -100,13 +100,7 @@ class ColumnsForm(Format):
 
 
 def form_of(text: str, name: str | None = None) -> Form | None:
-    """The form of lines of a name, or whose signs a log has; None for columns.
-
-    Raises
-    ------
-    PatternError
-        No format has that name.
-    """
+    """The form of lines of a name, or whose signs a log has; None for columns.  PatternError for another name."""
     if name is not None:
         if name not in (*LOG_FORMATS, *COLUMNS):
             raise PatternError(f"needed one of {', '.join([*LOG_FORMATS, *COLUMNS])}")
@@ -146,12 +140,8 @@ def to_try(text: str) -> str:
 def form_of_pattern(pattern: str) -> Form:
     """The form that a user's pattern describes.
 
-    One group is the residual; several are named ``residual``, ``iteration``, ``theta`` or ``omega``.
-
-    Raises
-    ------
-    PatternError
-        No regular expression, or other groups.
+    One group is the residual; several are named ``residual``, ``iteration``, ``theta`` or ``omega``.  PatternError for
+    other groups, and where it is no regular expression.
 
     Examples
     --------

@@ -76,20 +76,18 @@ def rows(
 
     With ``one_end`` only the largest eigenvalue is known, and the steps of a constant theta are :func:`at_most`.
     """
-    found = []
-    for method in METHODS:
-        bounded = one_end and method == "constant"
-        found.append(
-            MethodRow(
-                method=method,
-                neumann_body=neumann_body,
-                exchanged=exchanged,
-                theta=theta,
-                steps=at_most(spectrum.high, theta) if bounded else steps(spectrum, method, theta),
-                bound="at most" if bounded else None,
-            )
+    bounded = lambda method: one_end and method == "constant"
+    return tuple(
+        MethodRow(
+            method=method,
+            neumann_body=neumann_body,
+            exchanged=exchanged,
+            theta=theta,
+            steps=at_most(spectrum.high, theta) if bounded(method) else steps(spectrum, method, theta),
+            bound="at most" if bounded(method) else None,
         )
-    return tuple(found)
+        for method in METHODS
+    )
 
 
 def at_most(high: float, theta: float) -> int | None:

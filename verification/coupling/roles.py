@@ -175,13 +175,7 @@ class Role(Part):
 
     @property
     def predicted(self) -> tuple[float, float]:
-        """``theta_predicted`` and ``rate_predicted``.
-
-        Raises
-        ------
-        ValueError
-            The role is refused, or rho is bounded only from below.
-        """
+        """``theta_predicted`` and ``rate_predicted``; ValueError where the role is refused or rho is only bounded."""
         if self.theta_predicted is None or self.rate_predicted is None:
             raise ValueError(self.reason["theta_predicted"])
         return self.theta_predicted, self.rate_predicted
@@ -189,12 +183,8 @@ class Role(Part):
     def advised(self, *, tied: bool = False) -> tuple[float, float]:
         """theta and the rate by which it is chosen: the predicted ones, or those for a tied interface.
 
-        Where eigenvalues are complex, or estimated, the whole spectrum decides.
-
-        Raises
-        ------
-        ValueError
-            The role is refused, or the ends of its spectrum are not known.
+        Where eigenvalues are complex, or estimated, the whole spectrum decides.  ValueError where the role is refused,
+        or the ends of its spectrum are not known.
         """
         if self.spectrum is not None and (self.spectrum.source == "vectors" or not self.spectrum.real):
             return self.spectrum.theta, self.spectrum.factor(self.spectrum.theta)
@@ -240,20 +230,10 @@ def role_of(
     reason: Mapping[str, str] | None = None,
     **known: Any,
 ) -> Role:
-    """The role for a known rho: its prediction, and the proofs of the theorem in energy norms.
+    """The role for a known rho: its prediction, and the proofs of the theorem in energy norms, which are ``bounds``.
 
-    Parameters
-    ----------
-    neumann_body : {1, 2} or None
-    rho : Number or Fraction
-    bounds, nothing : EnergyBounds, optional, and str
-        The theorem for this rho, and for the friction there is; why nothing is proved, empty where the bounds are.
-    threshold, no_threshold : Number, optional, and str
-        Friction below which every small theta is proved; why there is none, if it is not for want of a proof.
-    reason : mapping, optional
-        Why other values are None.
-    **known
-        Other attributes of :class:`Role`.
+    ``nothing`` says why nothing is proved, ``no_threshold`` why there is no friction below which every small theta is,
+    if it is not for want of a proof, ``reason`` why other values are None; ``known`` are other attributes of the role.
     """
     ratio = Fraction(rho.value) if isinstance(rho, Number) else rho
     theta, rate = float(predicted_theta(ratio)), float(predicted_rate(ratio))

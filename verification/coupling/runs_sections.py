@@ -105,7 +105,7 @@ def of_logs(found: Logs) -> Sections:
         changes = found.kind.given(", or where contact changes")
         notes.append(f"Nothing by itself: a level is about where theta begins to diverge{changes}.")
     elif not read and any(log.slowest for log in found.logs):
-        notes.append("No reading of its own: the ratios are read together.")
+        notes.append("No reading by itself: the ratios are read together.")
     elif not read and found.logs:
         notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
     elif not read and not notes:

@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from textwrap import indent
-from typing import Any, Literal
+from typing import Literal
 
 from verification.coupling.kinds import METHODS
 
@@ -126,55 +126,42 @@ ACCELERATORS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 
 
+#: The parameters of Kratos.
+_KRATOS = """
+{"problem_data": {"start_time": 0.0, "end_time": 1.0, "parallel_type": "OpenMP", "echo_level": 1},
+ "solver_settings": {"type": "coupled_solvers.gauss_seidel_strong", "echo_level": 1,
+  "num_coupling_iterations": %(most)d,
+  "convergence_accelerators": [{"type": "%(type)s", "solver": "%(one)s", "data_name": "force",
+   %(factors)s, "echo_level": 4}],
+  "convergence_criteria": [{"type": "relative_norm_previous_residual", "solver": "%(one)s", "data_name": "force",
+   "abs_tolerance": 1e-12, "rel_tolerance": %(tolerance)r, "echo_level": 3}],
+  "data_transfer_operators": {"mapper": {"type": "kratos_mapping",
+   "mapper_settings": {"mapper_type": "nearest_neighbor"}}},
+  "coupling_sequence": [{"name": "%(one)s", "input_data_list": [], "output_data_list": []},
+   {"name": "%(other)s", "input_data_list": [{"data": "displacement", "from_solver": "%(one)s",
+     "from_solver_data": "displacement", "data_transfer_operator": "mapper"}],
+    "output_data_list": [{"data": "force", "to_solver": "%(one)s", "to_solver_data": "force",
+     "data_transfer_operator": "mapper", "data_transfer_operator_options": ["use_transpose", "swap_sign"]}]}],
+  "solvers": {"%(one)s": %(point_load)s, "%(other)s": %(reaction)s}}}"""
+
+#: A solver with the data displacement and force.
+_SOLVER = """
+{"type": "solver_wrappers.kratos.structural_mechanics_wrapper",
+ "solver_wrapper_settings": {"input_file": "ProjectParameters%s"}, "data": {
+  "displacement": {"model_part_name": "Structure.Interface", "variable_name": "DISPLACEMENT", "dimension": 2},
+  "force": {"model_part_name": "Structure.Interface", "variable_name": "%s", "dimension": 2}}}"""
+
+
 def kratos(c: CouplingScheme, method: str) -> str:
     """The parameters of CoSimulation for two plane structural models, each with an input file and a part Interface.
 
     With these levels of output the log has what ``advise run --log`` reads: residuals and the names of accelerators.
     """
-    one, other = c.neumann, c.contact
-    force: dict[str, Any] = {"solver": one, "data_name": "force"}
-    accelerator, factors = ACCELERATORS[method]
-    mapped: dict[str, Any] = {"data_transfer_operator": "mapper"}
-    reads = {"data": "displacement", "from_solver": one, "from_solver_data": "displacement", **mapped}
-    writes = {"data": "force", "to_solver": one, "to_solver_data": "force", **mapped}
-    writes["data_transfer_operator_options"] = ["use_transpose", "swap_sign"]
-    settings = {
-        "type": "coupled_solvers.gauss_seidel_strong",
-        "echo_level": 1,
-        "num_coupling_iterations": c.iterations,
-        "convergence_accelerators": [
-            {"type": accelerator, **force, **dict.fromkeys(factors, c.theta), "echo_level": 4}
-        ],
-        "convergence_criteria": [
-            {
-                "type": "relative_norm_previous_residual",
-                **force,
-                "abs_tolerance": 1e-12,
-                "rel_tolerance": TOLERANCE,
-                "echo_level": 3,
-            }
-        ],
-        "data_transfer_operators": {
-            "mapper": {"type": "kratos_mapping", "mapper_settings": {"mapper_type": "nearest_neighbor"}}
-        },
-        "coupling_sequence": [
-            {"name": one, "input_data_list": [], "output_data_list": []},
-            {"name": other, "input_data_list": [reads], "output_data_list": [writes]},
-        ],
-        "solvers": {one: _kratos_solver(one, "POINT_LOAD"), other: _kratos_solver(other, "REACTION")},
-    }
-    problem = {"start_time": 0.0, "end_time": 1.0, "parallel_type": "OpenMP", "echo_level": 1}
-    return json.dumps({"problem_data": problem, "solver_settings": settings}, indent=2)
-
-
-def _kratos_solver(name: str, force: str) -> dict[str, Any]:
-    """A solver with the data displacement and force; ``force`` is the variable of the latter."""
-    data = lambda variable: {"model_part_name": "Structure.Interface", "variable_name": variable, "dimension": 2}
-    return {
-        "type": "solver_wrappers.kratos.structural_mechanics_wrapper",
-        "solver_wrapper_settings": {"input_file": f"ProjectParameters{name}"},
-        "data": {"displacement": data("DISPLACEMENT"), "force": data(force)},
-    }
+    accelerator, names = ACCELERATORS[method]
+    known = {"one": c.neumann, "other": c.contact, "type": accelerator, "most": c.iterations, "tolerance": TOLERANCE}
+    known["factors"] = ", ".join(f'"{name}": {c.theta!r}' for name in names)
+    known |= {"point_load": _SOLVER % (c.neumann, "POINT_LOAD"), "reaction": _SOLVER % (c.contact, "REACTION")}
+    return json.dumps(json.loads(_KRATOS % known), indent=2)
 
 
 def norma(c: CouplingScheme, method: str) -> str:

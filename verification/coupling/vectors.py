@@ -275,10 +275,7 @@ def seen_in(
     bore : array of bool, shape (n,), optional
         The entries that were not 0 before these iterates.
 
-    Raises
-    ------
-    ValueError
-        The iterates, or their residuals, do not differ above rounding.
+    ValueError where the iterates, or their residuals, do not differ above rounding.
     """
     stays = _stays(X, TX, 1 + kind.parallel)
     given, last = len(X), len(X) if kind.linear else last_piece(TX)
@@ -477,9 +474,9 @@ def _stays(X: Floats, TX: Floats, fields: int) -> float:
 
     Of several fields the larger one counts; 0 elsewhere, and of few iterates.
     """
-    parts = zip(np.split(TX - X, fields, axis=1), np.split(TX, fields, axis=1), strict=True)
+    sizes = (np.linalg.norm(rows.reshape(len(X), fields, -1), axis=2) for rows in (TX - X, TX))
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.max([np.linalg.norm(r, axis=1) / np.linalg.norm(image, axis=1) for r, image in parts], axis=0)
+        shares = np.divide(*sizes).max(axis=1)
     third = len(X) // 3
     stays = float(np.median(shares[-third:]))
     return stays if third >= FEWEST and 1.25 * stays >= np.nanmin(shares[:-third]) else 0.0

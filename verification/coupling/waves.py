@@ -200,10 +200,7 @@ BODIES: tuple[BodyNumber, BodyNumber] = (1, 2)
 def read_waves(source: type[Waves], given: dict[str, Any], *, parallel: bool) -> Waves:
     """The evidence of plates that exchange heat, or of a fluid and a wall; ``given`` has what is not None.
 
-    Raises
-    ------
-    HypothesisError
-        A parameter that this source does not have, one that is missing, or numbers out of their range.
+    HypothesisError for a parameter that this source does not have, one that is missing, or numbers out of range.
     """
     for name, value in given.items():
         if name not in source.counts:
