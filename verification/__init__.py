@@ -68,40 +68,49 @@ if TYPE_CHECKING:
     from verification.sweeps.sweep import Sweep as Sweep
     from verification.sweeps.sweep import sweep as sweep
 
+
+def _table(text: str) -> dict[str, tuple[str, ...]]:
+    """The words behind each name, a line for each."""
+    lines = (line.partition(":") for line in text.split("\n") if ":" in line)
+    return {name.strip(): tuple(words.split()) for name, _, words in lines}
+
+
 #: The public names of each module.  No module at this level has the name of a public function: it would hide it.
-_NAMES: dict[str, tuple[str, ...]] = {
-    "algorithm.history": ("History", "march"),
-    "algorithm.iterate": ("Iterate",),
-    "algorithm.monolithic": ("Solution", "SolveError", "solve"),
-    "algorithm.relaxation": ("Rule",),
-    "algorithm.runs": ("Run", "run"),
-    "algorithm.start": ("iterate",),
-    "certificate.contraction": ("certify", "check_again"),
-    "comparison": ("Comparison", "compare"),
-    "constants.measured": ("Measured",),
-    "constants.measuring": ("measure",),
-    "contact": ("ContactError",),
-    "coupling.advice": ("Advice",),
-    "coupling.driver": ("Coupling", "couple"),
-    "coupling.from_logs": ("advise_logs",),
-    "coupling.from_matrices": ("advise_matrices",),
-    "coupling.from_moduli": ("advise_moduli",),
-    "coupling.from_problems": ("advise",),
-    "coupling.from_runs": ("advise_run",),
-    "coupling.from_vectors": ("advise_vectors",),
-    "exercises": ("check",),
-    "exploration.page": ("Exploration", "explore"),
-    "interface.build": ("build",),
-    "interface.interface": ("Law",),
-    "interface.pair": ("ContactPair",),
-    "ledger": ("Ledger", "verify"),
-    "problem.examples": ("example",),
-    "problem.files": ("load",),
-    "problem.specification": ("Problem",),
-    "problem.tables": ("ProblemError",),
-    "schemas": ("schema",),
-    "sweeps.sweep": ("Sweep", "sweep"),
-}
+_NAMES = _table(
+    """
+    algorithm.history: History march
+    algorithm.iterate: Iterate
+    algorithm.monolithic: Solution SolveError solve
+    algorithm.relaxation: Rule
+    algorithm.runs: Run run
+    algorithm.start: iterate
+    certificate.contraction: certify check_again
+    comparison: Comparison compare
+    constants.measured: Measured
+    constants.measuring: measure
+    contact: ContactError
+    coupling.advice: Advice
+    coupling.driver: Coupling couple
+    coupling.from_logs: advise_logs
+    coupling.from_matrices: advise_matrices
+    coupling.from_moduli: advise_moduli
+    coupling.from_problems: advise
+    coupling.from_runs: advise_run
+    coupling.from_vectors: advise_vectors
+    exercises: check
+    exploration.page: Exploration explore
+    interface.build: build
+    interface.interface: Law
+    interface.pair: ContactPair
+    ledger: Ledger verify
+    problem.examples: example
+    problem.files: load
+    problem.specification: Problem
+    problem.tables: ProblemError
+    schemas: schema
+    sweeps.sweep: Sweep sweep
+    """
+)
 
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
@@ -129,59 +138,52 @@ FILLS: dict[str, dict[str, tuple[str, ...]]] = {
     "log formats": {"": ("coupling.log_formats",)},
     "proofs": {"constants": ("certificate.proved_constants",), "losses": ("semidefinite.losses",)},
     "documents": {
-        "": (
-            "algorithm.history",
-            "algorithm.monolithic",
-            "algorithm.runs",
-            "bounds.table",
-            "certificate.continuum",
-            "certificate.contraction",
-            "cli.console",
-            "cli.problems",
-            "comparison",
-            "constants.measured",
-            "coupling.advice",
-            "exploration.page",
-            "free_norm.two_layers",
-            "interface.draft",
-            "ledger.rows",
-            "reproduce.experiments",
-            "sweeps.region",
-            "sweeps.store",
-            "sweeps.sweep",
+        "": tuple(
+            str.split(
+                """
+            algorithm.history algorithm.monolithic algorithm.runs bounds.table certificate.continuum
+            certificate.contraction cli.console cli.problems comparison constants.measured coupling.advice
+            exploration.page free_norm.two_layers interface.draft ledger.rows reproduce.experiments sweeps.region
+            sweeps.store sweeps.sweep
+            """
+            )
         )
     },
-    "sections": {
-        "algorithm.history": ("sections.history",),
-        "algorithm.monolithic": ("sections.run",),
-        "algorithm.runs": ("sections.run",),
-        "bounds.table": ("sections.bounds",),
-        "certificate.continuum": ("certificate.sections",),
-        "certificate.contraction": ("certificate.sections",),
-        "comparison": ("sections.comparison",),
-        "constants.measured": ("sections.constants",),
-        "coupling.advice": ("coupling.sections", "coupling.runs_sections", "coupling.material_sections"),
-        "exploration.page": ("exploration.sections",),
-        "free_norm.two_layers": ("free_norm.sections",),
-        "ledger.rows": ("ledger.sections",),
-        "reproduce.experiments": ("reproduce.sections",),
-        "sweeps.region": ("sweeps.sections",),
-        "sweeps.store": ("sweeps.sections",),
-        "sweeps.sweep": ("sweeps.sections",),
-    },
-    "figures": {
-        "algorithm.history": ("figures.history",),
-        "algorithm.monolithic": ("figures.bodies",),
-        "algorithm.runs": ("figures.residuals",),
-        "bounds.table": ("figures.squares",),
-        "comparison": ("figures.residuals",),
-        "constants.measured": ("figures.factor",),
-        "coupling.advice": ("figures.factor",),
-        "free_norm.two_layers": ("figures.layer_plane",),
-        "reproduce.experiments": ("figures.reproduction",),
-        "sweeps.region": ("figures.region",),
-        "sweeps.sweep": ("figures.sweep",),
-    },
+    "sections": _table(
+        """
+        algorithm.history: sections.history
+        algorithm.monolithic: sections.run
+        algorithm.runs: sections.run
+        bounds.table: sections.bounds
+        certificate.continuum: certificate.sections
+        certificate.contraction: certificate.sections
+        comparison: sections.comparison
+        constants.measured: sections.constants
+        coupling.advice: coupling.sections coupling.runs_sections coupling.material_sections
+        exploration.page: exploration.sections
+        free_norm.two_layers: free_norm.sections
+        ledger.rows: ledger.sections
+        reproduce.experiments: reproduce.sections
+        sweeps.region: sweeps.sections
+        sweeps.store: sweeps.sections
+        sweeps.sweep: sweeps.sections
+        """
+    ),
+    "figures": _table(
+        """
+        algorithm.history: figures.history
+        algorithm.monolithic: figures.bodies
+        algorithm.runs: figures.residuals
+        bounds.table: figures.squares
+        comparison: figures.residuals
+        constants.measured: figures.factor
+        coupling.advice: figures.factor
+        free_norm.two_layers: figures.layer_plane
+        reproduce.experiments: figures.reproduction
+        sweeps.region: figures.region
+        sweeps.sweep: figures.sweep
+        """
+    ),
 }
 
 

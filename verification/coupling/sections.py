@@ -360,7 +360,8 @@ def _together(said: Mapping[str, str]) -> list[str]:
 def paste(found: Advice, *more: str) -> Section:
     """Lines to paste, and notes on them."""
     several = found.problem is not None and found.problem.several
-    blocks = not (several or found.coupling.parallel or (found.theta or 0) > 1)
+    beyond = (found.theta or 0) > 1
+    blocks = not (several or found.coupling.parallel or beyond)
     said = [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."] * blocks
     auto = found.best.theta_auto
     if auto is not None and found.theta is not None:
@@ -376,7 +377,7 @@ def paste(found: Advice, *more: str) -> Section:
     both = "Both fields are relaxed: the scheme is parallel, and names both as data of the acceleration."
     one = "Relax displacements (heat: temperatures) alike, except in parallel coupling."
     said.append(both if found.coupling.parallel else one)
-    if found.theta is not None and found.theta > 1:
+    if beyond:
         said.append("preCICE takes a factor of at most 1: there use IQN-ILS, or relax in the solvers.")
     return pasted_for(found, found.neumann_body, *said, *more)
 

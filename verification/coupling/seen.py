@@ -349,9 +349,9 @@ def bounds(logs: Sequence[SeenLog], kind: Kind = CONTACT) -> tuple[list[LogBound
         if log.diverges:
             assumes = given(FROM_BELOW) + MORE_ACCURATE * log.stays
             says, value = "its residual grows, or stays at a level", 2 / theta - 1
-            left = [pace.least for pace in log.paces if pace.kind == "level" and pace.least is not None]
-            if kind.linear and left and min(left) < 1:
-                says, value = f"its residual falls by {few(min(left))} a step at most", rho(Fraction(min(left)), theta)
+            least = min((pace.least or 1.0 for pace in log.paces if pace.kind == "level"), default=1.0)
+            if kind.linear and least < 1:
+                says, value = f"its residual falls by {few(least)} a step at most", rho(Fraction(least), theta)
             lower.append(LogBound(value=value, log=log, says=says, assumes=assumes))
         if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):
             says = f"the relative residual of relaxed data stays at {few(plateau.value)}"

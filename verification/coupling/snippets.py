@@ -79,10 +79,10 @@ def snippet(library: str, coupling: CouplingScheme, method: str = "constant") ->
 
 
 #: The accelerations of preCICE, and their tag of the factor, or of the first one.
-ACCELERATIONS: dict[str, tuple[str, str]] = {
-    "constant": ("constant", "relaxation"),
-    "aitken": ("aitken", "initial-relaxation"),
-    "iqn-ils": ("IQN-ILS", "initial-relaxation"),
+ACCELERATIONS = {
+    "constant": "constant relaxation",
+    "aitken": "aitken initial-relaxation",
+    "iqn-ils": "IQN-ILS initial-relaxation",
 }
 
 
@@ -113,18 +113,17 @@ def precice(c: CouplingScheme, method: str) -> str:
 
 def precice_acceleration(c: CouplingScheme, method: str) -> str:
     """The element of the acceleration; a rule that adapts its factor must name the data."""
-    tag, factor = ACCELERATIONS[method]
+    tag, factor = ACCELERATIONS[method].split()
     data = [f'\n  <data name="{name}" mesh="{c.neumann}-Mesh" />' for name in c.data if method != "constant"]
     return f'<acceleration:{tag}><{factor} value="{c.theta:g}" />{"".join(data)}</acceleration:{tag}>'
 
 
 #: The convergence accelerators of Kratos, and their names of the factor, or of the first one and its upper limit.
-ACCELERATORS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "constant": ("constant_relaxation", ("alpha",)),
-    "aitken": ("aitken", ("init_alpha", "init_alpha_max")),
-    "iqn-ils": ("iqnils", ("alpha",)),
+ACCELERATORS = {
+    "constant": "constant_relaxation alpha",
+    "aitken": "aitken init_alpha init_alpha_max",
+    "iqn-ils": "iqnils alpha",
 }
-
 
 #: The parameters of Kratos.
 _KRATOS = """
@@ -157,7 +156,7 @@ def kratos(c: CouplingScheme, method: str) -> str:
 
     With these levels of output the log has what ``advise run --log`` reads: residuals and the names of accelerators.
     """
-    accelerator, names = ACCELERATORS[method]
+    accelerator, *names = ACCELERATORS[method].split()
     known = {"one": c.neumann, "other": c.contact, "type": accelerator, "most": c.iterations, "tolerance": TOLERANCE}
     known["factors"] = ", ".join(f'"{name}": {c.theta!r}' for name in names)
     known |= {"point_load": _SOLVER % (c.neumann, "POINT_LOAD"), "reaction": _SOLVER % (c.contact, "REACTION")}
