@@ -132,11 +132,11 @@ def __dir__() -> list[str]:
 #: The modules that fill each table of :mod:`verification.registry`: all entries under "", one entry under its name, or
 #: what is shown of the classes of a module.
 FILLS: dict[str, dict[str, tuple[str, ...]]] = {
-    "laws": {"": ("interface.friction",)},
-    "rules": {"": ("algorithm.relaxation",)},
-    "bounds": {"": ("bounds.table", "semidefinite.bound", "free_norm.bound")},
-    "log formats": {"": ("coupling.log_formats",)},
-    "proofs": {"constants": ("certificate.proved_constants",), "losses": ("semidefinite.losses",)},
+    "laws": _table(": interface.friction"),
+    "rules": _table(": algorithm.relaxation"),
+    "bounds": _table(": bounds.table semidefinite.bound free_norm.bound"),
+    "log formats": _table(": coupling.log_formats"),
+    "proofs": _table("constants: certificate.proved_constants\nlosses: semidefinite.losses"),
     "documents": {
         "": tuple(
             str.split(

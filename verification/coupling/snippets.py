@@ -157,9 +157,16 @@ def kratos(c: CouplingScheme, method: str) -> str:
     With these levels of output the log has what ``advise run --log`` reads: residuals and the names of accelerators.
     """
     accelerator, *names = ACCELERATORS[method].split()
-    known = {"one": c.neumann, "other": c.contact, "type": accelerator, "most": c.iterations, "tolerance": TOLERANCE}
-    known["factors"] = ", ".join(f'"{name}": {c.theta!r}' for name in names)
-    known |= {"point_load": _SOLVER % (c.neumann, "POINT_LOAD"), "reaction": _SOLVER % (c.contact, "REACTION")}
+    known = {
+        "one": c.neumann,
+        "other": c.contact,
+        "type": accelerator,
+        "most": c.iterations,
+        "tolerance": TOLERANCE,
+        "factors": ", ".join(f'"{name}": {c.theta!r}' for name in names),
+        "point_load": _SOLVER % (c.neumann, "POINT_LOAD"),
+        "reaction": _SOLVER % (c.contact, "REACTION"),
+    }
     return json.dumps(json.loads(_KRATOS % known), indent=2)
 
 
