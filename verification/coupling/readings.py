@@ -380,7 +380,7 @@ def at_risk(following: NextRun, made: Sequence[Made]) -> NextRun:
     low = max((one.theta for one in made if one.falls), default=Fraction(0))
     if following.kept or following.again or following.theta <= low:
         return following
-    falls = f"; {few(low)} falls, and so does a smaller theta" if low else ""
+    falls = f"; {few(low)} falls in its log, and near that solution a smaller theta does too" if low else ""
     return replace(following, why=f"{following.why}; it may diverge there{falls}")
 
 

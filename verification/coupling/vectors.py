@@ -77,6 +77,9 @@ WRONG_SIGN = (
 #: What two evaluations show.
 MEMORY = "noise or a memory of the solvers, as one iterate given twice shows"
 
+#: Directions of a general coupling that noise leaves out.
+DROWNED = "noise drowns a direction of the iterates, in which an eigenvalue of -1 or less may lie: needed less noise"
+
 _ERRORS = "estimated errors of both ends"
 _UNKNOWN: dict[str, Any] = {
     "unit": "1",
@@ -94,9 +97,10 @@ class Vectors(Evidence, Value):
     FEWEST or more.  ``spectrum`` has ``ritz``, the Ritz values less 1, and modes between them; ``course`` is the
     largest lambda after fewer iterates, and after all; ``loaded`` is True where a node that is open in the last image
     bore a force in an iterate, so that its mode, lambda = 0, has a share in the error; ``period`` is the number of
-    steps after which iterates come back, 0 where they do not; ``stays`` the size of the last residuals over |T x| where
-    noise keeps them from falling, else 0.  An end is found if it no longer changes with more directions: the least one
-    as the exchanged roles need it, in 1 + 1/lambda, and the largest one in 1 + lambda.
+    steps after which iterates come back, 0 where they do not; ``drowned`` is True if noise left out a direction of a
+    general coupling; ``stays`` the size of the last residuals over |T x| where noise keeps them from falling, else 0.
+    An end is found if it no longer changes with more directions: the least one as the exchanged roles need it, in 1 +
+    1/lambda, and the largest one in 1 + lambda.
     """
 
     unknowns: int = key(_COUNTS, unit="1")
@@ -136,6 +140,7 @@ class Vectors(Evidence, Value):
     course: tuple[float, ...]
     loaded: bool
     period: int
+    drowned: bool
     stays: float = 0.0
 
     @cached_property
@@ -219,7 +224,7 @@ class Vectors(Evidence, Value):
         if self.period:
             contact = self.kind.given("contact that opens and closes, ")
             causes = f"{contact}solvers that are not linear, or theta at its limit, where a mode hardly decays or grows"
-            back = f"the iterates come back after {self.period} steps, up to {BACK:.0%} of a step"
+            back = f"the iterates come back after {self.period} steps, up to {100 * BACK:.0f} % of a step"
             return f"hardly any progress: {back}, which these make: {causes}; more iterates or a smaller theta tell"
         if self.kind.parallel and (self.noise or 0.0) > LOUD:
             needed = "needed both fields in a row, their images likewise, and solvers with less noise"
@@ -242,7 +247,7 @@ class Vectors(Evidence, Value):
         if self.kind.parallel and not self.spectrum.parallel().theta:
             return "by these eigenvalues no theta above 0 converges with both solvers at once: run one after the other"
         too = f"with -1 or less no theta above 0 converges; {MEMORY}, makes such eigenvalues too"
-        return f"{said}: {too}" if least <= RANK - 1 else ""
+        return f"{said}: {too}" if least <= RANK - 1 else DROWNED * self.drowned
 
 
 def seen_in(
@@ -285,6 +290,7 @@ def seen_in(
     inside = np.ones(read - 1, dtype=bool) if starts is None else ~starts[-read + 1 :]
     unknowns = X.shape[1] // (1 + kind.parallel)
     values, residuals, noise = _ritz(X, TX, inside, kind)
+    apart = _apart(X, TX, inside)
     unsure = (noise or 0.0) * float(np.abs(values).max())
     low, high = (max(_error(values, residuals, i), unsure) for i in (0, -1))
     negative = kind.signed and bool(values[0].real < 1 - max(REAL, low))
@@ -314,14 +320,23 @@ def seen_in(
         settled=not changing or last >= FEWEST,
         ritz=values - 1,
         noise=noise,
-        apart=_apart(X, TX, inside),
+        apart=apart,
         low_found=min(least) > 0 and (known[0] or steady([1 + 1 / one for one in least])),
         high_found=(known[1] or steady(tops) or rises) and not (spectrum.unsure or unsymmetric(kind, spectrum, course)),
         course=course,
         loaded=loaded,
         period=_period(X),
+        drowned=bool(apart) and not kind.signed and _rank(X, inside) > len(values),
         stays=stays if noise else 0.0,
     )
+
+
+def _rank(X: Floats, inside: NDArray[np.bool_]) -> int:
+    """The number of independent differences of iterates, each of length 1."""
+    D = np.diff(X, axis=0)[inside]
+    lengths = np.linalg.norm(D, axis=1)
+    D = D[lengths > 0] / lengths[lengths > 0, None]
+    return int(np.linalg.matrix_rank(D, tol=RANK * np.sqrt(len(D)))) if len(D) else 0
 
 
 def falls(course: Sequence[float]) -> bool:
@@ -429,7 +444,7 @@ def _images(
     if not used.any():
         used = sigma == sigma[0]
     if again.any():
-        noise = max(noise or 0.0, loud and float((rounding / sigma)[used].max()))
+        noise = max(noise or 0.0, loud and float((rounding[used] / sigma[used]).max()))
     return U[:, used], images[:, used] / sigma[used], noise
 
 

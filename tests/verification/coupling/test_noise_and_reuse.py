@@ -261,3 +261,21 @@ def test_only_directions_that_newer_changes_have_not_shown_are_kept():
 def test_a_number_of_steps_that_is_none_is_refused(reuse):
     with pytest.raises(ValueError, match="reuse"):
         vf.Coupling(reuse=reuse)
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-4])
+@pytest.mark.parametrize("low", [-1.0001, -1.001, -1.01, -1.05])
+def test_noise_hides_no_eigenvalue_below_minus_1_of_a_general_coupling(low, noise):
+    """The mode of the least eigenvalue hardly changes its image: noise may leave its direction out."""
+    lam, solution = np.array([low, 0.5, 1.0, 3.0]), np.ones(4)
+    for count, seed in itertools.product((8, 20), range(3)):
+        draw = np.random.default_rng(seed)
+        image = lambda x, draw=draw: (solution - lam * (x - solution)) * (1 + noise * draw.normal(size=4))
+        X = [np.zeros(4)]
+        TX = [image(X[0])]
+        for _ in range(count):
+            X.append(X[-1] + 0.3 * (TX[-1] - X[-1]))
+            TX.append(image(X[-1]))
+        found = vf.advise_vectors([X[0], *X], [image(X[0]), *TX], kind="general")
+        assert found.theta is None
+        assert found.why_no_theta

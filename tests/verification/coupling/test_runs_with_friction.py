@@ -181,5 +181,7 @@ def test_the_next_run_with_friction_is_explained_by_where_it_lies(theta):
     found = vf.advise_run(theta, "0.3", friction=True).next
     where = "larger" if found.theta > float(theta) else "smaller"
     assert found.why.startswith(f"{where} than {theta}")
-    risk = f"; it may diverge there; {theta} falls, and so does a smaller theta" * (where == "larger")
+    risk = f"; it may diverge there; {theta} falls in its log, and near that solution a smaller theta does too" * (
+        where == "larger"
+    )
     assert found.why.endswith(f"that run shows whether a {where} one is faster{risk}")

@@ -389,7 +389,7 @@ def test_iterates_that_come_back_are_no_progress_and_leave_no_theta():
         x = (x + TX[-1]) / 2
     found = vf.advise_vectors(X, TX, kind="tied")
     assert (found.vectors.period, found.theta, found.method) == (2, None, None)
-    assert "the iterates come back after 2 steps, up to 3% of a step" in found.why_no_theta
+    assert "the iterates come back after 2 steps, up to 3 % of a step" in found.why_no_theta
     assert "more iterates" in found.why_no_theta
     assert vf.advise_vectors(*Linear([0.5, 2.0]).run("constant", 0.5, 12)).vectors.period == 0
 
