@@ -98,7 +98,7 @@ class Vectors(Evidence, Value):
     largest lambda after fewer iterates, and after all; ``loaded`` is True where a node that is open in the last image
     bore a force in an iterate, so that its mode, lambda = 0, has a share in the error; ``period`` is the number of
     steps after which iterates come back, 0 where they do not; ``drowned`` is True if noise left out a direction of a
-    general coupling; ``stays`` the size of the last residuals over |T x| where noise keeps them from falling, else 0.
+    general coupling; ``stays`` the size of the last residuals over T x where noise keeps them from falling, else 0.
     An end is found if it no longer changes with more directions: the least one as the exchanged roles need it, in 1 +
     1/lambda, and the largest one in 1 + lambda.
     """
