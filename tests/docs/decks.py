@@ -45,6 +45,8 @@ def pages_of(deck: Path) -> list[Path]:
 
 def script(widget: str) -> str:
     """The script that fills a widget."""
+    if widget == "chain":  # the main chain of the map
+        return "map"
     return widget if (DOCS / "widgets" / f"{widget}.js").exists() else "scenes"
 
 
