@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import re
 from math import log10
@@ -25,11 +26,13 @@ DOCS = Path(__file__).parents[2] / "docs"
 LARGEST = 300_000
 
 
-def test_the_colour_d55e00_is_orange_in_all_words():
-    """Its name in programs is red, between quotes or behind a dot."""
+def test_the_colour_d55e00_is_orange_in_all_words(builder):
+    """Its name in programs is red, between quotes or behind a dot; what is built of them has words of its own."""
     files = [*DOCS.glob("*.md"), *DOCS.glob("examples/*.md"), *DOCS.glob("widgets/*.js")]
     files += DOCS.glob("builder/questions/*.py")
     assert [file.name for file in files if re.search(r"(?<![\w.\"'])[Rr]ed(?![\w\"'])", file.read_text("utf-8"))] == []
+    shown = json.dumps([widget.data() for widget in builder.widgets.WIDGETS.values()])
+    assert re.findall(r"[^\"]*\b[Rr]ed\b[^\"]*", shown.replace('"red"', "")) == []
 
 
 # The formulas.

@@ -26,6 +26,9 @@ WAYS = {
 #: The friction of the question, and the one before it.
 ASKED, BEFORE = 0.8, 0.1
 
+#: The words for the colours that are both orange on the screen.
+SHADES = {"red": "dark orange", "orange": "light orange"}
+
 #: The highest factor that is drawn.
 HIGHEST = 1.25
 
@@ -118,4 +121,7 @@ def says(k: float, here: Mapping[str, tuple[float, float] | None]) -> str:
 def legend() -> list[dict[str, Any]]:
     """The words for the colours, below all curves."""
     named = [*((colour, words) for words, colour in WAYS.values()), ("grey", "no norm goes below")]
-    return [note(0.02, 0.37 - 0.085 * i, f"{colour}: {words}", colour) for i, (colour, words) in enumerate(named)]
+    lines = sorted(
+        ((f"{SHADES.get(colour, colour)}: {words}", colour) for colour, words in named), key=lambda at: len(at[0])
+    )
+    return [note(0.02, 0.37 - 0.085 * i, *line) for i, line in enumerate(lines)]  # the curves leave most room below

@@ -15,6 +15,18 @@ from verification.coupling.vectors import LOUD
 VALUES = np.geomspace(0.1, 6, 12)
 
 
+def remembering(image, share=1 / 2):
+    """A solver that answers with its image and a share of its last answer."""
+    state = np.zeros(12)
+
+    def solver(u):
+        nonlocal state
+        state = share * state + (1 - share) * image(u)
+        return state
+
+    return solver
+
+
 def twice(T, **settings):
     """A coupling of T whose start is evaluated twice."""
     given = {"start": np.zeros(12), "kind": "tied", "rule": "aitken", "theta": 0.2, "max_iterations": 12}
@@ -67,14 +79,7 @@ def test_little_noise_that_is_seen_takes_no_advice_away(noise):
 
 
 def test_a_solver_with_a_memory_is_told_and_gets_no_theta():
-    state = np.zeros(12)
-
-    def remembers(u):
-        nonlocal state
-        state = state / 2 + (1 - VALUES * (u - 1)) / 2
-        return state
-
-    advice = twice(remembers).advice
+    advice = twice(remembering(lambda u: 1 - VALUES * (u - 1))).advice
     assert advice.vectors.apart > LOUD
     assert (advice.theta, advice.roles) == (None, ())
     assert "a memory, so that T is not a function of x" in advice.why_no_theta
@@ -110,26 +115,15 @@ def test_two_images_that_are_the_same_up_to_rounding_are_no_noise():
 @pytest.mark.parametrize(("noise", "memory"), [(1e-5, 0), (1e-3, 0), (1e-2, 0), (0, 0.01), (0, 0.08), (0, 0.1)])
 def test_directions_below_noise_or_memory_that_is_seen_count_for_no_theta(noise, memory, rule):
     """2/(2 + 0.1 + 6) = 0.247, and 2/7 = 0.286 diverges; errors of a thousand eigenvalues gave 1e-5 once."""
-    random, state = np.random.default_rng(3), np.zeros(12)
-
-    def solver(u):
-        nonlocal state
-        state = memory * state + (1 - memory) * (1 - VALUES * (u - 1)) * (1 + noise * random.normal(size=12))
-        return state
-
+    random = np.random.default_rng(3)
+    solver = remembering(lambda u: (1 - VALUES * (u - 1)) * (1 + noise * random.normal(size=12)), memory)
     found = twice(solver, rule=rule, max_iterations=14).advice
     assert found.theta is None or (0.2 < found.theta < 0.28 and not memory)
     assert found.theta is not None or noise != 1e-5
 
 
 def test_without_a_pair_a_memory_is_named_beside_an_eigenvalue_below_minus_1():
-    state = np.zeros(12)
-
-    def remembers(u):
-        nonlocal state
-        state = state / 2 + (1 - VALUES * (u - 1)) / 2
-        return state
-
+    remembers = remembering(lambda u: 1 - VALUES * (u - 1))
     start = {"start": np.zeros(12), "kind": "general", "rule": "aitken", "theta": 0.2, "max_iterations": 14}
     why = vf.couple(lambda g: g, remembers, **start).advice.why_no_theta
     assert "with -1 or less no theta above 0 converges; noise or a memory of the solvers" in why
