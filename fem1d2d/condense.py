@@ -34,6 +34,9 @@ STEP = 2.0**-70
 #: Up to so many unknowns dense matrices cost less than sparse ones: a tenth at 100, as much at 270.
 FEW = 200
 
+#: Rows of a factor that are multiplied together: neighbours in the order reach few unknowns of the interface.
+ROWS = 256
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
@@ -76,6 +79,9 @@ class Condensation:
         interface is shifted meanwhile, which shifts the Schur complement by as much and changes nothing else.
     """
 
+    #: Unknowns on the interface from which on its dense block costs SuperLU more than the products that leave it out.
+    MANY = 1000
+
     def __init__(
         self, matrix: sp.csc_array, interface: Ints, order: Ints | None = None, *, singular: bool = False
     ) -> None:
@@ -117,7 +123,7 @@ class Condensation:
         """``A_BB + A_BI lift``, shape (b, b)."""
         if len(self.inside) == 0:
             return symmetric(self._on_interface.toarray())
-        return self._unshifted(self._rest(_factor(self._shifted(self.matrix), self.order)))
+        return self._unshifted(self._rest(self._shifted(self.matrix), self.order))
 
     def _unshifted(self, schur: Floats) -> Floats:
         """The Schur complement of the matrix, given the one of the shifted matrix."""
@@ -140,15 +146,15 @@ class Condensation:
             raise ValueError("the matrix is singular: needed a definite one")
 
     def solver(self) -> Callable[[Floats], Floats]:
-        """``load -> A^-1 load`` on all unknowns, as :func:`solver`; its factorisation gives the Schur complement too.
+        """``load -> A^-1 load`` on all unknowns, as :func:`solver`; a small Schur complement comes with it.
 
         The factorisation, the largest part of the memory, lives as long as the function that is returned.  ValueError
         if the matrix is singular.
         """
         self._needs_definite()
         factor = _factor(self.matrix, self.order)
-        if len(self.inside):
-            self.schur = self._rest(factor)
+        if len(self.inside) and len(self.interface) < self.MANY:
+            self.schur = _last_block(factor, len(self.inside))
         return _solving(factor, self.order)
 
     def response(self, load: Floats) -> Response:
@@ -191,14 +197,14 @@ class Condensation:
         difference cancels, and one factorisation gives all entries to rounding.
         """
         step = STEP * _power_of_two(self.matrix) / _power_of_two(form)
-        return self._rest(_factor(self._shifted(self.matrix + 1j * step * form), self.order)).imag / step
+        return self._rest(self._shifted(self.matrix + 1j * step * form), self.order).imag / step
 
-    def _rest(self, factor: Any) -> NDArray[Any]:
-        """``X_BB - X_BI X_II^-1 X_IB`` of a factorised matrix X."""
-        # the last rows and columns, unless SuperLU moved some that do not depend on each other
-        last = factor.perm_c[len(self.inside) :]
-        L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
-        return symmetric(L @ U)
+    def _rest(self, matrix: sp.csc_array, order: Ints) -> NDArray[Any]:
+        """``X_BB - X_BI X_II^-1 X_IB`` of a symmetric matrix X and an order of elimination that ends with B."""
+        i = len(self.inside)
+        if len(self.interface) < self.MANY:
+            return _last_block(_factor(matrix, order), i)
+        return _by_columns(matrix[:, order][order].tocsc(), i)
 
     def condense(self, load: Floats) -> Floats:
         """The load condensed onto the interface, ``load_B + lift' load_I``, shape (b,), of its unit.
@@ -212,7 +218,7 @@ class Condensation:
         if "schur" not in vars(self):  # one elimination gives both: the load is the last row and column
             column = sp.csc_array(load[:, None])
             bordered = sp.block_array([[self._shifted(self.matrix), column], [column.T, None]], format="csc")
-            rest = self._rest(_factor(bordered, np.append(self.order, len(load))))
+            rest = self._rest(bordered, np.append(self.order, len(load)))
             self.schur = self._unshifted(rest[:-1, :-1])
             return rest[:-1, -1].copy()
         return np.asarray(load[self.interface] - self._coupling.T @ self._solve_inside(inner))
@@ -384,6 +390,36 @@ def _factor(matrix: sp.csc_array, order: Ints | None) -> Any:
         return splu(ordered, permc_spec="MMD_AT_PLUS_A" if order is None else "NATURAL", **SYMMETRIC)
     except RuntimeError:
         raise MeshError(SINGULAR) from None
+
+
+def _last_block(factor: Any, i: int) -> NDArray[Any]:
+    """What elimination leaves of all unknowns but the first i, from the factors of the whole matrix."""
+    # the last rows and columns, unless SuperLU moved some that do not depend on each other
+    last = factor.perm_c[i:]
+    L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
+    return symmetric(L @ U)
+
+
+def _by_columns(X: sp.csc_array, i: int) -> NDArray[Any]:
+    """The same of a symmetric matrix, in products: with ``X_II = L D L'`` and ``W = L^-1 X_IB``, ``X_BB - W' D^-1 W``.
+
+    W is what elimination makes of the columns of B where their own block is the identity and the rows of B are empty,
+    so that SuperLU finds it without that block.
+    """
+    n = X.shape[0]
+    above = sp.block_array([[X[:i, :i], X[:i, i:]], [None, sp.eye_array(n - i, dtype=X.dtype)]], format="csc")
+    factor = _factor(above, np.arange(n))
+    if not np.array_equal(factor.perm_r, factor.perm_c):  # a pivot beside the diagonal
+        return _last_block(_factor(X, np.arange(n)), i)
+    rows, last = np.sort(factor.perm_c[:i]), factor.perm_c[i:]
+    pivots, W = factor.U.diagonal()[rows], factor.U[:, last].tocsr()[rows]
+    rest: NDArray[Any] = X[i:, i:].toarray()
+    for start in range(0, i, ROWS):
+        part = W[start : start + ROWS]
+        own = np.unique(part.indices)
+        w = part[:, own].toarray()
+        rest[np.ix_(own, own)] -= w.T @ (w / pivots[start : start + ROWS, None])
+    return symmetric(rest)
 
 
 def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats], Floats]:

@@ -11,8 +11,15 @@ from fem1d2d import Condensation, Lifted, gram, stiffness
 
 EPS = np.finfo(float).eps
 
-#: In sparse matrices, and in the dense ones of a body of few unknowns.
-either = pytest.mark.parametrize("kind", [Condensation, Lifted])
+
+class Products(Condensation):
+    """As of an interface with many unknowns."""
+
+    MANY = 0
+
+
+#: In sparse matrices, with few or many unknowns on the interface, and in the dense ones of a body of few unknowns.
+either = pytest.mark.parametrize("kind", [Condensation, Products, Lifted])
 
 
 def norm(A):
