@@ -1,4 +1,4 @@
-"""The semidefinite bound on Section 6: one program beside cvxpy with SCS, and what is made of it beside one program.
+"""The semidefinite bound on Section 6: what is made of its programs beside one of them.
 
 python benchmarks/bench_lmi.py [--full] [--largest NODES] [--random N]
 
@@ -15,7 +15,7 @@ from timing import in_turn, timed
 
 import verification as vf
 from verification.ledger.cases import problem as random_problem
-from verification.semidefinite import LMIError, interior_point, model
+from verification.semidefinite import LMIError, interior_point
 from verification.semidefinite.interior_point import Optimum, Program
 from verification.semidefinite.lipschitz import GAP, budget, enclose
 from verification.semidefinite.losses import locate
@@ -23,11 +23,8 @@ from verification.semidefinite.multipliers import QuadraticForms, friction_thres
 
 THETA = 0.7
 
-#: Contact nodes and rounds.
-SIZES = {7: 9, 13: 9, 25: 9, 49: 5, 97: 3}
-
-#: Contact nodes up to which SCS is asked too; more with --full, where it takes minutes.
-SCS, SCS_FULL = 25, 49
+#: Contact nodes.
+SIZES = (7, 13, 25, 49)
 
 #: Contact nodes up to which all that is made of the program is measured.
 WHOLE, BOTH = 49, 25
@@ -43,10 +40,6 @@ def program_of(pair: vf.ContactPair, measured: vf.Measured) -> Program:
 
     QuadraticForms(pair, measured, solver=solve).factor(THETA)
     return asked[0]
-
-
-def by_scs(program: Program) -> Optimum:
-    return model.solve(program, solver="SCS", eps=1e-4, max_iters=20_000)
 
 
 def whole(pair: vf.ContactPair, measured: vf.Measured) -> None:
@@ -89,31 +82,8 @@ def main() -> None:
     parser = options(__doc__)
     parser.add_argument("--random", type=int, metavar="N", help="branch and bound on N random problems")
     chosen = parser.parse_args()
-    scs = SCS_FULL if chosen.full else SCS
     models = {nodes: of_section_6(nodes) for nodes in SIZES if nodes <= chosen.largest}
     programs = {nodes: program_of(*found) for nodes, found in models.items()}
-
-    rows = []
-    for nodes, program in programs.items():
-        ours, other = (lambda program=program, solve=solve: solve(program) for solve in (interior_point.solve, by_scs))
-        asked = nodes <= scs
-        apart = abs(ours().s - other().s) if asked else None  # a first round too
-        assert apart is None or apart < 1e-3
-        rounds = SIZES[nodes] if not asked else 3 if nodes <= SCS else 1
-        rows.append(row(nodes, in_turn(ours, other if asked else None, rounds=rounds, warm=not asked), apart))
-    record = Record(
-        name="bound_program",
-        place=6,
-        title="One program of the semidefinite bound",
-        ours="our interior-point method",
-        other="the same program by cvxpy and SCS, tolerance 1e-4",
-        peer="cvxpy with SCS",
-        size="contact nodes",
-        rows=tuple(rows),
-        apart="difference of q^2, the square of the factor",
-        wanted="less than 0.1 s at 25 nodes and less than 3 s at 97",
-    )
-    report(record, chosen.record)
 
     for place, name, title, what, call, most, wanted in (
         (7, "bound_whole", "The semidefinite bound", "the factor, the largest theta and the threshold of friction",
