@@ -20,7 +20,7 @@ Signs = NDArray[np.int8]
 #: Signs are read with this slack relative to the largest force, so that rounding does not flip a node for ever.
 SLACK = 1e-14
 
-#: Corrections of a guess, at most; a few suffice unless it cycles.
+#: Corrections of a guess, at most, besides one for each node: the border of a zone may move by one node at a time.
 LIMIT = 60
 
 #: Numbers (32 MB) of the linear systems that are kept: a run that comes back to a pattern finds its system there.
@@ -123,7 +123,7 @@ class ActiveSet:
     ) -> None:
         self._t, self._systems = tangential, systems or Systems(S, free, motions)
         self._held = None if free[:tangential].all() else ~free[:tangential]
-        self._stiffness = float(np.diag(S).max())
+        self._stiffness, self._limit = float(np.diag(S).max()), LIMIT + len(S) - tangential
 
     def _begin(self, start: Pattern, smooth: Bools, hint: Pattern | None) -> Pattern:
         """Return the first guess: no held node slides, every node whose bound is zero does.
@@ -148,7 +148,7 @@ class ActiveSet:
         The first guess is ``hint`` where there is one.
         """
         seen: set[bytes] = set()
-        for v, force, pattern, agrees in islice(self._guesses(q, bound, start, hint), LIMIT):
+        for v, force, pattern, agrees in islice(self._guesses(q, bound, start, hint), self._limit):
             if agrees:
                 return v, force, pattern
             if pattern.key in seen:
@@ -159,7 +159,7 @@ class ActiveSet:
     def repeated(self, q: Floats, bound: Floats, start: Pattern) -> Iterator[tuple[Floats, Floats, Pattern]]:
         """Yield the guesses that come again and again where the pattern does not settle; none where it does."""
         seen: set[bytes] = set()
-        for v, force, pattern, agrees in islice(self._guesses(q, bound, start), LIMIT, 2 * LIMIT):
+        for v, force, pattern, agrees in islice(self._guesses(q, bound, start), self._limit, 2 * self._limit):
             if agrees or pattern.key in seen:
                 return
             seen.add(pattern.key)

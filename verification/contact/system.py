@@ -17,7 +17,7 @@ TOLERANCE = 1e-11
 #: Signs are read with this slack relative to the largest force or jump.
 SLACK = 1e-14
 
-#: Patterns after which Newton's method gives up; it needs a few, or repeats itself.
+#: Patterns after which Newton's method gives up, besides one for each node; it seldom needs more, or repeats itself.
 LIMIT = 40
 
 #: Sweeps before the next start of Newton's method, doubled each time, and the number of starts.
@@ -163,7 +163,7 @@ class ContactSystem:
     def newton(self, branches: Branches) -> Equilibrium | None:
         """Solve for the branches and correct them by the signs found until they agree; None where they repeat."""
         seen: set[bytes] = set()
-        for _ in range(LIMIT):
+        for _ in range(LIMIT + len(self.d0) - self.t):
             if branches.key in seen:
                 return None
             seen.add(branches.key)

@@ -11,6 +11,7 @@ import pytest
 import strategies
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scipy.linalg import block_diag
 
 from verification.contact import KKT, TOLERANCE, ContactError, ContactStep
 from verification.contact.active_set import ActiveSet, Pattern, Systems
@@ -437,3 +438,13 @@ def test_no_number_is_certified_where_one_is_not_a_number():
             values = case[name].copy()
             values[i] = np.nan
             assert not certify(**case | {name: values}).residual <= TOLERANCE
+
+
+@pytest.mark.parametrize("n", [200, 400])
+def test_a_slip_zone_that_grows_by_a_few_nodes_at_a_time_is_followed_to_its_end(n):
+    """A string under a load that falls along it: what a node lets go its neighbours take up."""
+    string, load = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1), np.linspace(1.5, 0, n)
+    step = ContactStep(block_diag(string, np.eye(n)), np.ones(2 * n, dtype=bool), n, "active-set")
+    found = step.solve(np.concatenate([load, np.ones(n)]), np.full(n, 0.5))
+    assert found.pattern.sliding.all()
+    assert found.v[:n] == pytest.approx(np.linalg.solve(string, load - 0.5), abs=1e-9)
