@@ -191,7 +191,7 @@ def test_there_is_no_snippet_while_readings_are_left(call):
     answer = call("advise", "run", "--theta", "0.1", "--ratio", "1.4", "--snippets", "all")
     assert answer.status == 0
     assert "WHICH RUN NEXT?" in answer.out
-    assert answer.err == "no snippet: several readings are left; make the run that the answer names\n"
+    assert answer.err == "no snippet: several readings or thetas are left; make the run that the answer names\n"
 
 
 @pytest.mark.parametrize(

@@ -32,9 +32,6 @@ SWIFT = math.exp(TO / (DEAR * FEWEST))
 #: Couplings with fewer modes than this may take fewer steps than their spectrum predicts: one mode needs a single step.
 FEWEST_MODES = 5
 
-#: Unless logs say otherwise, a is taken to be at most this share of b: a body of several elements has softer modes.
-SOFT = 0.5
-
 #: Thetas that are compared are so much apart, and so many intervals each side of a box has.
 FINE, MESH = 1.02, 4
 
@@ -70,10 +67,6 @@ class Box:
     def best(self) -> tuple[float, float]:
         """The limits of the best theta."""
         return 2 / (self.a[1] + self.b[1]), 2 / (self.a[0] + self.b[0])
-
-    def softened(self) -> Box:
-        """The same where the softest mode is at most SOFT of the stiffest one."""
-        return Box(a=(min(self.a[0], SOFT * self.b[1]), min(self.a[1], max(self.a[0], SOFT * self.b[1]))), b=self.b)
 
 
 #: What holds of every tied run: 0 <= lambda_min <= rho; and of a run of any coupling.

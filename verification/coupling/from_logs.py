@@ -302,17 +302,19 @@ def _within(paces: Sequence[Pace]) -> str:
 
 
 def interval_of(lower: list[LogBound], upper: list[LogBound]) -> RhoInterval:
-    """The largest bound from below beside the smallest from above."""
+    """The largest bound from below beside the smallest estimate from above that it leaves."""
     lo = max(lower, key=lambda bound: bound.value, default=None)
     hi = min(upper, key=lambda bound: bound.value, default=None)
     contradiction = None
     if lo is not None and hi is not None and 1 + lo.value > AGREE * (1 + hi.value):
         one, other = (f"{bound.log.file} with theta = {few(bound.log.theta)}" for bound in (hi, lo))
         contradiction = (
-            f"by {one} rho is at most {few(hi.value)}, by {other} at least {few(lo.value)}: there is "
-            "friction, contact changes between the runs, a theta was not constant, the coupling is not symmetric (as "
-            "with convection), or they are not runs of one problem in the same roles"
+            f"by {one} rho is at most {few(hi.value)}, by {other} at least {few(lo.value)}: the first is too short to "
+            "show the stiffest mode, there is friction, contact changes between the runs, a theta was not constant, "
+            "the coupling is not symmetric (as with convection), or they are not runs of one problem in the same roles"
         )
+    elif lo is not None:
+        hi = min((one for one in upper if one.value >= lo.value), key=lambda bound: bound.value, default=None)
     return RhoInterval(lo=lo, hi=hi, contradiction=contradiction)
 
 
@@ -335,17 +337,14 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, kind: Kind) -> Deci
         return swift.readings, kept(swift.theta, why), None
     if kind.parallel:
         return base.readings, base.next, base.rho
-    by_all = by_ends(logs, base, None if lo is None else lo.value, kind) if kind.linear or base.rho is None else None
-    if by_all is not None:
+    if (by_all := by_ends(logs, base, None if lo is None else lo.value, kind)) is not None:
         return by_all
-    if base.rho is not None:
-        return base.readings, robust(logs, base.next), base.rho
     if not falling and len(rising) > 1:
         if lo is not None and predicted_theta(lo.value) < base.theta / 4:
             return base.readings, best_if(lo.value, "the least one by these logs, of which none converges"), None
         why = "a quarter of the smallest theta so far, as none converges; the log of that run narrows rho"
         return base.readings, NextRun(theta=rounded_down(base.theta / 4), why=why), None
-    return base.readings, base.next, None
+    return base.readings, base.next, base.rho
 
 
 def boxes_of(log: SeenLog, kind: Kind) -> list[Box]:
@@ -408,7 +407,7 @@ def cost_in_words(boxes: Sequence[Box], dear: float, kind: Kind) -> str:
     """The reason for a theta, in words."""
     times = "" if dear < 1.05 else f"at most {math.ceil(10 * dear - 1e-9) / 10:g} times "
     same = kind.given(" where contact does not change")
-    where = f"as the logs leave them{same}, with {ends.FEWEST_MODES} modes or more"
+    where = f"of the modes that the logs show{same}, with {ends.FEWEST_MODES} modes and {ends.FEWEST:g} steps or more"
     return f"{times}the fewest steps if {ends_in_words(boxes)}, {where}"
 
 
@@ -419,13 +418,3 @@ def contrary(logs: Sequence[SeenLog], base: SeenLog, kind: Kind, why: str, how: 
         return base.readings, kept(min(falls)[1], f"it falls fastest; {why}"), None
     half = rounded_down(min(log.theta for log in logs) / 2)
     return base.readings, NextRun(theta=half, why=f"half of the smallest theta{how}: {why}"), None
-
-
-def robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
-    """The theta where rho is known and the softest mode is not: at most ``2/(2 + rho)``, best where nodes are open."""
-    boxes = [box.softened() for box in ends.common([boxes_of(log, CONTACT) for log in logs])]
-    if not boxes:
-        return best
-    theta, dear = ends.cheapest(boxes, best.theta)
-    smaller = rounded_down(theta)
-    return best if smaller >= best.theta else NextRun(theta=smaller, why=cost_in_words(boxes, dear, CONTACT))

@@ -18,6 +18,9 @@ from verification.coupling.readings import FEWEST_STEPS, Observed, spread, steps
 #: Logarithms of ratios that scatter and drift by less, or by a fifth of theta, are steady.
 STEADY = 0.03
 
+#: Ratios still move where their logarithms in both halves of a window differ by more than this and rounding.
+MOVES = 3e-4
+
 #: Below this a relative residual ``|T x - x|/|T x|`` has the ratios of the absolute one, nearly: for the solution y and
 #: without friction, or tied, ``|T x - T y| <= |T x - x|`` in the norm (5.21): ``|T x|`` is ``|y|`` within this share.
 SMALL = 0.1
@@ -75,7 +78,8 @@ class Pace:
     largest; where it is lost in rounding or zero, the share of rounding.  The series is ``lost`` if it ends in inf or
     nan, has ``arrived`` if it ends in rounding or zero, a step after those that can be read, and ``adapts`` if it falls
     much faster than before after it rose: a constant factor does not do that.  Of a level that repeats itself
-    ``period`` is the number of steps after which it does, and ``least`` the ratio by which it may still fall.
+    ``period`` is the number of steps after which it does, and ``least`` the ratio by which it may still fall.  What has
+    visibly not settled ``moves``.
     """
 
     kind: Kind
@@ -89,6 +93,7 @@ class Pace:
     arrived: bool = False
     adapts: bool = False
     period: int = 0
+    moves: bool = False
 
     @property
     def swift(self) -> bool:
@@ -172,9 +177,9 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
         sure = scatter + drift + 2 * written / steps + 1e-9
         if relative:
             sure += math.log((1 + largest) / (1 - largest)) / steps
-        return Pace(
-            kind="steady", value=math.exp(median), least=math.exp(median - sure), most=math.exp(median + sure), **known
-        )
+        least, most = math.exp(median - sure), math.exp(median + sure)
+        moves = drift > MOVES + 2 * written / lag
+        return Pace(kind="steady", value=math.exp(median), least=least, most=most, moves=moves, **known)
 
     last = ratio(len(values))
     tail = values[-steps - 1 :]
@@ -199,7 +204,7 @@ def pace(residuals: Floats, column: Column, theta: Fraction, *, linear: bool = F
     if before is not None and before.grows:
         return before
     if height < CONVERGED and (settles := _settling(tail, relative, limit, steps)) is not None:
-        return Pace(kind="steady", **settles, **known)
+        return Pace(kind="steady", moves=True, **settles, **known)
     small = int(np.argmax(values[::-1] > SMALL)) if relative and values.max() > SMALL else taken + 1
     if 0 < small <= steps:  # that a relative residual shows; windows of a few of them can be pooled
         return Pace(kind="short", **(known | {"steps": small - 1, "lost": lost}))
@@ -312,7 +317,7 @@ def together(paces: Sequence[Pace]) -> Observed | None:
     paces = [one for one in paces if one.kind != "plateau" and one.grows] or paces
     least, most = (np.array([getattr(one, name) for one in paces]) for name in ("least", "most"))
     middle = float(np.median([one.value for one in paces if one.value is not None]))
-    if len(paces) < 10:
-        return Observed.of(middle, float(least.min()), float(most.max()))
-    low, high = float(np.quantile(least, 0.1)), float(np.quantile(most, 0.9))
-    return Observed.of(middle, min(middle, low), max(middle, high))
+    low, high = float(least.min()), float(most.max())
+    if len(paces) >= 10:
+        low, high = min(middle, float(np.quantile(least, 0.1))), max(middle, float(np.quantile(most, 0.9)))
+    return replace(Observed.of(middle, low, high), moves=any(one.moves for one in paces))

@@ -134,11 +134,12 @@ class NextRun(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Observed(Part):
-    """A number that was read from a run, and its limits."""
+    """A number that was read from a run, and its limits; it ``moves`` where a window visibly has not settled."""
 
     value: Fraction = key("the median over the windows", type="number", unit="1", of=float)
     least: Fraction = key(**_LIMITS)
     most: Fraction = key(**_LIMITS)
+    moves: bool = False
 
     @classmethod
     def of(cls, value: float | Fraction, least: float | Fraction, most: float | Fraction) -> Observed:
@@ -221,7 +222,7 @@ def read_observed(
     between = 2 / (high + Fraction(7, 4))  # above the best theta of mode-high, below the one at which it diverges
     if kinds == ["mode-high"]:
         following = min(best, LARGEST_TO_PASTE)
-        why = f"the best one if rho is {few(high)}, and smaller than that of this run, which converges"
+        why = f"the best one if rho is {few(high)} and the least eigenvalue 0; smaller than this run's, which converges"
     elif r > 1 + spread(theta):
         following = between
         confirmed = f"a ratio of {few(following * (1 + high) - 1)} there confirms mode-high"

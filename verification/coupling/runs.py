@@ -116,7 +116,7 @@ class Runs(Evidence):
             return ""
         if self.friction_bounds is not None:
             return "with friction no run decides theta: make the run that `next` names"
-        return "several readings are left: make the run that `next` names"
+        return "several readings or thetas are left: make the run that `next` names"
 
     @property
     def summary(self) -> str:

@@ -9,7 +9,7 @@ from verification.coupling.advice import Advice
 from verification.coupling.pace import RELATIVE
 from verification.coupling.readings import RunReading
 from verification.coupling.runs import Logs, OneRun, Runs
-from verification.coupling.runs_with_friction import FrictionBounds
+from verification.coupling.runs_with_friction import UNSETTLED, FrictionBounds
 from verification.coupling.sections import (
     AS_ABOVE,
     few_methods,
@@ -165,22 +165,29 @@ def _bound(which: str, bound: LogBound | None, logs: Sequence[SeenLog]) -> list[
         return []
     source = f"theta = {float(bound.log.theta):.4g}: {bound.says}" if len(logs) > 1 else bound.says
     value = rounded(float(bound.value), 4, up=which == "most")
-    return [f"rho is at {which} {value} given {bound.assumes} ({source})"]
+    estimated = ", an estimate" * (which == "most")
+    return [f"rho is at {which} {value}{estimated} given {bound.assumes} ({source})"]
 
 
 def _with_friction(bounds: FrictionBounds | None) -> Sections:
-    """Bounds that hold with friction; nothing without friction."""
+    """A bound and estimates with friction; nothing without friction."""
     if bounds is None:
         return ()
     said = []
     if bounds.image is not None:
         image = rounded(bounds.image, 3, up=False)
         theorem = "sqrt(rho) R, with 2 R = s + sqrt(s^2 + 4 kappa_2) and s = sqrt(rho) + kappa_1"
-        said.append(f"The Lipschitz constant of T in the norm (5.21) is at least {image}; it is at most {theorem}.")
+        known = f"T has a Lipschitz constant of {image} or more in the norm"
+        proved = f"Proved: {known} of the log, if absolute;" if bounds.image != 1 else "Proved:"
+        said.append(f"{proved} if residuals go on so, {known} (5.21), where it is at most {theorem}.")
     if bounds.eigenvalue is not None and bounds.theta is not None and bounds.rate is not None:
         least, most = (rounded(end, 3, up=up) for end, up in zip(bounds.eigenvalue, (False, True), strict=True))
         gain = rounded(1 - bounds.rate, 3, up=False)
-        near = f"Near the solution of the run at theta = {bounds.theta:.4g}, if contact does not change there, its"
-        words = f"slowest mode has |1 + lambda| from {least} to {most}, and a smaller theta' takes at most"
-        said.append(f"{near} {words} 1 - {gain} theta'/{bounds.theta:.4g} a step.")
-    return (section("with friction", "WHAT IS PROVED WITH FRICTION?", *(said or ["Nothing."])),)
+        near = f"Estimated, of the modes seen at theta = {bounds.theta:.4g}, if the ratio is the limit and contact does"
+        words = (
+            f"not change: the slowest one has |1 + lambda| from {least} to {most}, and a smaller theta' takes at most"
+        )
+        said.append(f"{near} {words} 1 - {gain} theta'/{bounds.theta:.4g} a step. More steps may show slower modes.")
+    return (
+        section("with friction", "WHAT IS PROVED OR ESTIMATED WITH FRICTION?", *(said or [f"Nothing: {UNSETTLED}."])),
+    )

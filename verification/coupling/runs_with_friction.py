@@ -1,15 +1,17 @@
-"""Advice from runs with friction: bounds that their residuals prove, and the run to make next.
+"""Advice from runs with friction: what their residuals prove and what they let estimate, and the run to make next.
 
 With friction no ratio of residuals bounds rho.  The theorem in energy norms bounds one step by a factor q of rho,
 kappa_1 and kappa_2 together, and a mode that slides has a complex eigenvalue.  Three things are left:
 
-* Every step of T_theta is at most ``(1 - theta) + theta L`` in the norm (5.21), where L is the Lipschitz constant of T.
-  So a steady ratio r has ``L >= 1 - (1 - r)/theta``, and a run that does not converge has ``L >= 1``.  The theorem has
-  ``L <= sqrt(rho) R`` with ``R = (s + sqrt(s^2 + 4 kappa_2))/2`` and ``s = sqrt(rho) + kappa_1``.
+* Every step of T_theta is at most ``(1 - theta) + theta L`` in any norm, where L is the Lipschitz constant of T in it.
+  So a ratio r of absolute residuals proves ``L >= 1 - (1 - r)/theta`` in the norm of the log.  If residuals go on so
+  for ever, this holds in the norm (5.21), and ``L >= 1`` if they stay at a level.  The theorem has ``L <= sqrt(rho) R``
+  there, with ``R = (s + sqrt(s^2 + 4 kappa_2))/2`` and ``s = sqrt(rho) + kappa_1``.
 * Near a solution where contact does not change, each mode is multiplied by ``1 - theta z`` with a complex number z.
-  The slowest one has ``|1 - theta z| = r``, so that ``(1 - r)/theta <= |z| <= (1 + r)/theta``.
-* There the ratio is the largest of these moduli.  It is convex in theta and 1 at theta = 0.  So a smaller theta' has at
-  most ``1 - (1 - r) theta'/theta``, and lines through two known ratios bound it from below beyond both.
+  The limit r of the ratios is the largest ``|1 - theta z|``, so that ``(1 - r)/theta <= |z| <= (1 + r)/theta`` for the
+  slowest mode.  It is convex in theta and 1 at theta = 0.  So a smaller theta' has ``1 - (1 - r) theta'/theta`` or
+  less, and lines through two limits bound it from below beyond both.  A log shows no limit, as a slower mode may be too
+  small to be seen yet: all this is an estimate, and left out where ratios visibly move.
 """
 
 from __future__ import annotations
@@ -38,22 +40,24 @@ _SAYS = {
     "level": "contact alternates between open and closed, or stick and slip: with friction this does not bound rho",
 }
 
+UNSETTLED = "no residual falls, or the ratio of the largest theta has not settled"
 
 _FASTEST: dict[str, Any] = {
-    "says": r"the largest theta whose residual falls, and its ratio at most: near that solution a smaller $\theta'$ "
-    r"takes at most $1 - (1 - \text{rate})\,\theta'/\theta$ a step",
+    "says": r"the largest theta whose residual falls, and its ratio at most if it has settled; an estimate of the "
+    r"modes in its log: a smaller $\theta'$ takes at most $1 - (1 - \text{rate})\,\theta'/\theta$ a step",
     "unit": "1",
-    "null": "where no residual falls",
-    "why": "no residual falls steadily",
+    "null": "where it has not",
+    "why": UNSETTLED,
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionBounds(Part):
-    """Bounds that runs with friction prove; ``sqrt(rho) R`` is at least ``image``, too."""
+    """A bound that runs with friction prove, and estimates; if residuals go on so, ``sqrt(rho) R >= image``, too."""
 
     image: float | None = key(
-        "the Lipschitz constant of $T$ in the norm (5.21) is at least this",
+        "the Lipschitz constant of $T$ in the norm of absolute residuals is at least this; in the norm (5.21), and "
+        "where 1 is given for a residual at a level, if residuals go on as in the log",
         unit="1",
         null="where every run is as fast as with only open nodes",
         why="every run is as fast as with open nodes alone",
@@ -61,11 +65,11 @@ class FrictionBounds(Part):
     theta: float | None = key(**_FASTEST)
     rate: float | None = key(**_FASTEST)
     eigenvalue: tuple[float, float] | None = key(
-        r"limits `least` and `most` of $\lvert 1 + \lambda\rvert$ for the slowest mode of that run",
+        r"limits `least` and `most` of $\lvert 1 + \lambda\rvert$ for the slowest mode that the log shows, an estimate",
         type="map of number",
         unit="1",
         null="where there is none",
-        why="no residual falls steadily",
+        why=UNSETTLED,
         of=lambda ends: dict(zip(("least", "most"), ends, strict=True)),
     )
 
@@ -95,22 +99,18 @@ def with_friction(logs: Sequence[SeenLog]) -> tuple[tuple[RunReading, ...], Next
 def friction_bounds(
     falling: Sequence[tuple[Fraction, Observed]], rising: Sequence[tuple[Fraction, Observed | None]]
 ) -> FrictionBounds:
-    """Bounds from runs whose residual falls by a ratio, and from those that do not converge.
+    """A bound and estimates from runs whose residual falls by a ratio, and from those that do not converge.
 
     Both are sequences of theta and its steady ratio; None for a residual that stays at a level.
     """
     known = [(theta, ratio.least) for theta, ratio in (*falling, *rising) if ratio is not None]
-    image = max([1 - (1 - least) / theta for theta, least in known] + [Fraction(1)] * bool(rising), default=Fraction(0))
+    shown = max([1 - (1 - least) / theta for theta, least in known] + [Fraction(1)] * bool(rising), default=Fraction(0))
+    image = below(shown) if shown > 0 else None
     theta, ratio = max(falling, key=lambda run: run[0], default=(None, None))
-    ends = None
-    if theta is not None and ratio is not None:
-        ends = below((1 - ratio.most) / theta), above((1 + ratio.most) / theta)
-    return FrictionBounds(
-        image=below(image) if image > 0 else None,
-        theta=None if theta is None else float(theta),
-        rate=None if ratio is None else above(ratio.most),
-        eigenvalue=ends,
-    )
+    if theta is None or ratio is None or ratio.moves:
+        return FrictionBounds(image=image, theta=None, rate=None, eigenvalue=None)
+    ends = below((1 - ratio.most) / theta), above((1 + ratio.most) / theta)
+    return FrictionBounds(image=image, theta=float(theta), rate=above(ratio.most), eigenvalue=ends)
 
 
 def readings_with_friction(readings: Sequence[RunReading]) -> tuple[RunReading, ...]:
@@ -142,7 +142,8 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
     thetas = [low + (high - low) * i / BETWEEN for i in range(BETWEEN + 1)]
     least = min(least_rate(points, at) for at in thetas)
     if least > 0 and math.log(least) >= DEAR * math.log(float(ratio.most)):
-        return kept(theta, f"{pace}, and between {low:.4g} and {high:.4g} none takes less than 1/{DEAR:g} of its steps")
+        none = f"none between {low:.4g} and {high:.4g} takes less than 1/{DEAR:g} of its steps"
+        return kept(theta, f"{pace}, and by these ratios {none}")
     if max(middle / low, high / middle) < SHORTEST_STEP:
         return kept(theta, f"{pace}, and the runs next to it leave no room for a faster one")
     where, end = ("smaller", low) if middle / low > high / middle else ("larger", high)

@@ -46,7 +46,8 @@ MORE_ACCURATE = ", a residual that stays at its level in a longer run too, and s
 RATIOS_RISE = ", and a norm in which the coupling is symmetric, so that ratios only rise"
 TIED = "a tied interface"
 LINEAR = "a linear coupling with real eigenvalues, none below 0"
-FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
+FROM_ABOVE = "all of Gamma_c closed near the solution, nothing sliding"
+SHOWN = ", and a log that shows the stiffest mode"
 
 _TOGETHER: dict[str, Any] = {
     "says": "from all windows together",
@@ -54,7 +55,7 @@ _TOGETHER: dict[str, Any] = {
     "why": "no window shows one",
 }
 _BOUND: dict[str, Any] = {
-    "says": r"the largest lower bound of $\rho$, and the smallest upper bound",
+    "says": r"the largest lower bound of $\rho$, and the smallest upper one that it leaves, an estimate",
     "null": "where no log gives one",
 }
 
@@ -323,10 +324,12 @@ class LogBound(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class RhoInterval(Part):
-    """Bounds of rho from the logs of one coupling together; ``contradiction`` says why no rho lies between them."""
+    """A bound of rho from below, and an estimate from above; ``contradiction`` says why no rho lies between them."""
 
     lo: LogBound | None = key(**_BOUND, why="no log bounds rho from below without a reading")
-    hi: LogBound | None = key(**_BOUND, why="no log converges", of=lambda hi: hi.to_dict() | {"value": above(hi.value)})
+    hi: LogBound | None = key(
+        **_BOUND, why="no log that converges gives one", of=lambda hi: hi.to_dict() | {"value": above(hi.value)}
+    )
     contradiction: str | None = key(
         "which logs exclude each other",
         null="where none do",
@@ -335,7 +338,7 @@ class RhoInterval(Part):
 
 
 def bounds(logs: Sequence[SeenLog], kind: Kind = CONTACT) -> tuple[list[LogBound], list[LogBound]]:
-    """Every bound of rho from below and from above that a log gives."""
+    """Every bound of rho from below, and estimate from above, that a log gives."""
     lower, upper = [], []
     given = lambda words: kind.given(words) or LINEAR
     rho = lambda r, theta: rho_in_parallel(theta, r) if kind.parallel else (1 + r) / theta - 1
@@ -358,5 +361,5 @@ def bounds(logs: Sequence[SeenLog], kind: Kind = CONTACT) -> tuple[list[LogBound
             lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=given(TIED)))
         if ratio is not None and log.converges:
             says = f"its residual changes by {few(ratio.most)} a step at most"
-            upper.append(LogBound(value=rho(ratio.most, theta), log=log, says=says, assumes=given(FROM_ABOVE)))
+            upper.append(LogBound(value=rho(ratio.most, theta), log=log, says=says, assumes=given(FROM_ABOVE) + SHOWN))
     return lower, upper

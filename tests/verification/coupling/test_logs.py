@@ -205,7 +205,7 @@ def test_a_level_as_low_as_the_solvers_are_accurate_bounds_nothing(tmp_path):
         found = advise_logs([(precice(tmp_path / "a.log", [{"ResAbs(M:F)": steady}]), "0.45")])
         assert found.logs[0].columns[0].count(height) == 1
         assert found.readings[0].value == pytest.approx(3, rel=0.03)
-        assert (found.roles == ()) == (height == "floor")
+        assert (found.logs[0].rho is None) == (height == "floor")
         if height == "floor":
             assert found.readings[-1].lo is None
             assert found.interval.hi is None
@@ -234,16 +234,18 @@ def test_logs_that_exclude_each_other_are_told_and_never_averaged(tmp_path):
     for part in ("a.log", "b.log", "at least 9", "at most 3"):
         assert part in found.interval.contradiction
     assert found.roles == advise_logs([stiff, soft], tied=True).roles == ()
-    assert advise_logs([soft]).roles  # alone it decides
+    assert advise_logs([soft]).interval.contradiction is None
 
 
 def test_a_theta_that_falls_fast_is_kept_only_where_no_softer_mode_leaves_a_faster_one(tmp_path):
     """Modes from 4.7 to 18.55: the fewest steps are at 2/(2 + 4.7 + 18.55) = 0.0792, and a smaller theta is safe."""
     modes = (4.7, 10.0, 18.55)
     logs = [of(tmp_path, theta, modes, name=f"{theta}.log") for theta in (0.0796, 0.0985)]
-    found = advise_logs(logs)
-    assert 0.07 < found.next.theta < 0.0796
-    assert "times the fewest steps" in found.next.why
+    third = advise_logs(logs).next
+    assert third.theta < 0.0796
+    found = advise_logs([*logs, of(tmp_path, third.theta, modes, name="third.log")])
+    assert 0.07 < found.theta < 0.0796
+    assert "the fewest steps" in found.next.why
 
 
 def couplings():

@@ -1,6 +1,7 @@
 """Runs with friction: no bound of rho is claimed, what is claimed holds, and the runs lead to a fast theta."""
 
 import math
+from dataclasses import replace
 from fractions import Fraction as F
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.coupling.readings import Observed
 from verification.coupling.runs_with_friction import friction_bounds, least_rate, next_with_friction
+from verification.show.layout import text
 
 THETAS, RATIOS = st.fractions(F(1, 10**4), 1), st.fractions(F(1, 1000), 20)
 
@@ -72,13 +74,40 @@ def test_a_run_that_does_not_converge_has_an_image_of_1_at_least_and_bounds_are_
     assert (level.image, level.theta, level.rate, level.eigenvalue) == (1.0, None, None, None)
     assert set(level.to_dict()["reason"]) == {"theta", "rate", "eigenvalue"}
     seen = Observed(value=F(9, 10), least=F(8, 9), most=F(10, 11))
-    found = friction_bounds([(F(1, 3), seen), (F(1, 7), seen)], [])
+    found = friction_bounds([(F(1, 3), seen), (F(1, 7), replace(seen, moves=True))], [])
     assert found.theta == 1 / 3  # the largest that falls
+    moves = friction_bounds([(F(1, 3), replace(seen, moves=True)), (F(1, 7), seen)], [])
+    assert (moves.image, moves.theta, moves.rate, moves.eigenvalue) == (found.image, None, None, None)
     assert F(found.image) <= 1 - (1 - F(8, 9)) * 3 < F(math.nextafter(found.image, 2))
     least, most = map(F, found.eigenvalue)
     assert least <= 3 * F(1, 11) < F(math.nextafter(float(least), 9))
     assert most >= 3 * F(21, 11) > F(math.nextafter(float(most), 0))
     assert friction_bounds([(F(1, 3), Observed.known(F(2, 3)))], []).image is None
+
+
+def test_of_ratios_that_still_rise_nothing_is_estimated_and_what_is_estimated_says_so(tmp_path):
+    """Modes of 0.41 and 0.58 a step, the slower one small at first: the ratio so far was said to prove a bound."""
+    advised = lambda series: vf.advise_logs(
+        [(precice(tmp_path / "a", [{"ResAbs(M:F)": series}]), "0.85")], friction=True
+    )
+    screen = lambda found: " ".join(text(found.sections()).split())
+    rising = advised([0.41**n + 3e-3 * 0.58**n for n in range(21)])
+    assert rising.logs[0].slowest.moves
+    bounds = rising.friction_bounds
+    assert (bounds.theta, bounds.rate, bounds.eigenvalue) == (None, None, None)
+    assert bounds.image > 0
+    assert "Estimated" not in screen(rising)
+    settled = advised([0.58**n for n in range(40)])
+    assert settled.friction_bounds.rate == pytest.approx(0.58, rel=1e-3)
+    assert not settled.logs[0].slowest.moves
+    said = screen(settled).partition("WHAT IS PROVED OR ESTIMATED WITH FRICTION?")[2]
+    proved, estimated = said.split("Estimated, of the modes seen at theta = 0.85, if the ratio is the limit")
+    assert "of the log, if absolute; if residuals go on so" in proved
+    assert "|1 + lambda|" not in proved
+    assert "More steps may show slower modes." in estimated
+    assert "Nothing: no residual falls, or the ratio of the largest theta has not settled." in screen(
+        advised([0.1**n for n in range(5)])
+    )
 
 
 def test_tied_with_friction_is_refused(tmp_path):
