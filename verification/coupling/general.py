@@ -3,7 +3,7 @@
 A mode is multiplied by ``1 - theta z`` with ``z = 1 + lambda``.  A run with ratio r has all z between ``(1 - r)/theta``
 and ``(1 + r)/theta``, and one of both ends among them: an eigenvalue that changes its sign in every step, or one that
 keeps it.  The second is positive feedback where lambda < 0; a larger theta is then faster, above 1 as well.  Where a z
-is below 0 no theta converges.
+is below 0 no theta converges.  Both ends fit two ratios of any coupling, so that a third one has to confirm them.
 """
 
 from __future__ import annotations
@@ -82,10 +82,13 @@ def decide(each: Sequence[Sequence[Box]], made: Sequence[Made]) -> tuple[NextRun
     theta, cost = ends.cheapest(boxes, float(ANY_THETA))
     if cost <= DEAR and falling:
         low, high = min(box.a[0] for box in boxes) - 1, most - 1
-        why = (
-            f"at most {max(cost, 1):.2g} times the fewest steps with lambda from {low:.3g} to {high:.3g}, by these runs"
-        )
-        return NextRun(theta=rounded_down(theta), why=why), Spectrum.between(low, high)
+        theta, between = rounded_down(theta), f"with lambda from {low:.3g} to {high:.3g}, if all are real"
+        if len(each) > 2 or any(same_run(theta, one.theta) for one in made):
+            why = f"at most {max(cost, 1):.2g} times the fewest steps {between}, by these runs"
+            return NextRun(theta=theta, why=why), Spectrum.between(low, high)
+        ratio = max(abs(1 - theta * z) for z in (1 + low, 1 + high))
+        why = f"the best one {between}: then its ratio is {ratio:.3g} or less, and a larger one shows complex ones"
+        return readings.at_risk(NextRun(theta=theta, why=why), made), None
     # the second run is below the first: it converges where that does, and shows which end does not change the sign
     largest = max((float(one.theta) for one in falling), default=min(known))
     below = min([float(one.theta) for one in rising], default=float(ANY_THETA))

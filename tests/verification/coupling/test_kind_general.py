@@ -71,6 +71,27 @@ def test_the_eigenvalue_of_a_run_is_one_of_its_readings(mode, theta):
         assert [one.lo for one in found.readings] == pytest.approx([float(value) for value in seen])
 
 
+def test_two_ratios_fit_any_coupling_and_a_third_one_has_to_confirm_that_eigenvalues_are_real():
+    """z = 0.45 to 2.2 and 1.6 +- 2.1 i: 0.431 was 1.1 times the fewest steps at most, and took 653, not 176."""
+    z = np.array([0.45, 1.0, 2.2, 1.6 + 2.1j])
+    ratio = lambda theta: float(np.abs(1 - theta * z).max())
+    advised = lambda *thetas: vf.advise_run(
+        thetas[-1], ratio(thetas[-1]), kind="general", earlier=[(theta, ratio(theta)) for theta in thetas[:-1]]
+    )
+    second = advised(0.5).next.theta
+    two = advised(0.5, second)
+    assert (two.theta, two.spectrum) == (None, None)
+    assert "if all are real: then its ratio is" in two.next.why
+    said = float(two.next.why.partition("its ratio is ")[2].split()[0])
+    assert ratio(two.next.theta) > said + 0.05
+    three = advised(0.5, second, two.next.theta)
+    assert three.theta is None
+    assert "no coupling with real eigenvalues" in three.next.why
+    z = z[:3]
+    assert "if all are real, by these runs" in (found := advised(0.5, second, advised(0.5, second).next.theta)).next.why
+    assert found.theta == pytest.approx(2 / 2.65, rel=0.05)
+
+
 @pytest.mark.parametrize("first", [1.0, 0.5])
 def test_a_fixed_stress_loop_gets_its_theta_above_1(tmp_path, first):
     found, made = followed(tmp_path, FIXED_STRESS, first)
