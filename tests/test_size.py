@@ -11,7 +11,7 @@ BESIDE = {tokenize.COMMENT, tokenize.NL}
 LAYOUT = {tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 #: Lines and tokens of code of the three packages together at most; comments, docstrings and layout are no tokens.
-LINES, TOKENS = 59_170, 433_970
+LINES, TOKENS = 59_205, 434_520
 
 #: Lines of each package at most, those of packages inside it apart: a tenth more than it has.
 BUDGET = {
@@ -24,7 +24,7 @@ BUDGET = {
     "verification.cli": 2800,
     "verification.constants": 1050,
     "verification.contact": 1100,
-    "verification.coupling": 8820,
+    "verification.coupling": 8850,
     "verification.exploration": 850,
     "verification.figures": 1800,
     "verification.free_norm": 1750,

@@ -128,16 +128,17 @@ class Advice(Document):
             first += f"; {least} is {low:.3g}"
         if self.next is not None and abs(self.theta - theta) > SAME_THETA * theta:
             return f"{first}. So relax by theta = {self.theta:.4g}: {self.next.why}."
-        bound = "about " if best.level == "estimated" else "at most " * (tied or best.proved)
-        then = f"So relax by {self._formula(best, theta)} = {theta:.3g}: {bound}{in_steps(rate)} to 1e-9"
+        taken = f"{'at most ' * (tied or best.proved)}{in_steps(rate)} to 1e-9"
+        then = f"So relax by {self._formula(best, theta)} = {theta:.3g}: "
+        then += self.steps_with_errors if best.level == "estimated" else taken
         linear = " if the coupling is linear" if self.declared else " if nothing opens or slips"
         then += linear if tied else " without friction" if best.proved else " are predicted"
         if other is not None:
             away = in_steps(self.chosen(other)[1]).removesuffix(" steps")
             then += ", the same with the roles exchanged" if self.no_difference else f", against {away}"
         if (own := self.method_to_paste) != "constant":
-            then += f". {methods.NAMES[own]} from there is predicted to take {self.steps_of(own)} to 1e-6, not "
-            then += self.steps_of("constant").removesuffix(" steps")
+            then += f". {methods.NAMES[own]} from there is predicted to take {self.steps_of(own)} to 1e-6"
+            then += ", not " + self.steps_of("constant").removesuffix(" steps") if best.level != "estimated" else ""
         return f"{first}. {then}."
 
     def _formula(self, role: Role, theta: float) -> str:
@@ -368,6 +369,21 @@ class Advice(Document):
         exchanged = self.best is not self.roles[0]
         row = next(row for row in self.methods if row.method == method and row.exchanged == exchanged)
         return "no end of steps" if row.steps is None else f"{f'{row.bound} ' if row.bound else ''}{row.steps} steps"
+
+    @property
+    def steps_with_errors(self) -> str:
+        """The steps of an estimated theta to 1e-6, and those with the least eigenvalue at the end of its error."""
+        said, seen = f"about {self.steps_of('constant')} to 1e-6", self.vectors
+        if seen is None or self.theta is None or self.coupling.parallel:
+            return said
+        if None in seen.estimated_errors:
+            return f"{said} (with an error that is not known)"
+        both = seen.seen, seen.seen.lowest(self.coupling.least)
+        few, most = (methods.steps(each, "constant", self.theta) or 0 for each in both)
+        if not most:
+            return "in unknown steps (with the least eigenvalue at the end of its error none converges)"
+        wide = f"about {few} to {most} steps to 1e-6 (by the error of the least eigenvalue)"
+        return wide if most > methods.NEAR * few else said
 
     @property
     def best(self) -> Role:

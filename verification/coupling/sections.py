@@ -299,6 +299,7 @@ def of_vectors(found: Advice, seen: Vectors) -> Iterator[Section]:
         notes = [
             f"Ritz values: eigenvalues as these vectors show them, from inside; {errors_of}.",
             f"theta = {theta:.4g} = {formula}, and the error of the largest: factor {near_one(rate)} a step",
+            f"With this theta: {found.steps_with_errors}.",
         ]
     if spectrum.low + spectrum.error_low < 0 and not found.coupling.signed:
         notes.append("An eigenvalue between -1 and 0 is positive feedback; a theta above 1 is not a mistake there.")

@@ -8,7 +8,7 @@ are real and at least 0 where both are symmetric stiffnesses; open nodes have la
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -103,6 +103,10 @@ class Spectrum(Value):
         return Spectrum(
             values=np.concatenate([[0j], self.values]), source=self.source, error_low=0.0, error_high=self.error_high
         )
+
+    def lowest(self, least: float) -> Spectrum:
+        """The same with the least eigenvalue at the lower end of its error, or at the least one that may be."""
+        return replace(self, values=np.append(max(self.low - self.error_low, min(self.low, least)), self.values[1:]))
 
     def parallel(self) -> Spectrum:
         """The same for *parallel* coupling, an error added at the upper end: both square roots of minus each."""

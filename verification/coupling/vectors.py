@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -39,10 +40,10 @@ DIGITS, SOME = 12, 1000
 #: them.  Predicted over real steps in 31 linear couplings: 0.82 to 1.28 for IQN-ILS, 0.62 to 1.27 for Aitken.
 SETTLED, MORE = 0.02, 3
 
-#: An end is found if 1 + lambda has changed by no more than this share over the last FEWER directions, of which so many
-#: must be left.  Over nine iterates of Aitken in 40 random couplings it changed by 0.024 at most; in a coupling whose
-#: smooth data hide the stiff modes it changed by 0.06 or more as long as theta diverged.
-STEADY, FEWER, LEFT = 0.05, 2, 1
+#: An end is found if 1 + lambda has changed by no more than this share over the last FEWER directions.  Over nine
+#: iterates of Aitken in 40 random couplings it changed by 0.024 at most; in a coupling whose smooth data hide the
+#: stiff modes it changed by 0.06 or more as long as theta diverged.
+STEADY, FEWER = 0.05, 2
 
 #: An end that rises ever more slowly, by no more than this share, may rise as much again: theta has room for it.  One
 #: that fell by more than the second share, where no eigenvalue is below 0, is of no symmetric linear map.
@@ -52,14 +53,14 @@ RISING, FALLS = 0.2, 0.02
 #: a linear mode with a factor near -1 changes them by as much from period to period.
 BACK, RETURNED = 0.03, 1e-6
 
-#: Two images of one iterate that are further apart, over its residual, leave no eigenvalue.
+#: Two images of one iterate that are further apart, over its residual, leave no eigenvalue; nor do such moves of ends.
 LOUD = 0.1
 
 #: Residuals below this share of the value show a space that the coupling maps to itself.
 INVARIANT = 1e-6
 
-#: The fewest iterates of one contact pattern from which eigenvalues are read.
-FEWEST = 4
+#: The fewest iterates of one contact pattern from which eigenvalues are read, and the first ones left out in turn.
+FEWEST, LEFT_OUT = 4, 3
 
 #: Entries of an image below this share of the largest are 0, by rounding: the force of an open node.
 OPEN = 1e-12
@@ -77,8 +78,9 @@ WRONG_SIGN = (
 #: What two evaluations show.
 MEMORY = "noise or a memory of the solvers, as one iterate given twice shows"
 
-#: Directions of a general coupling that noise leaves out.
+#: Why an eigenvalue of a general coupling may be -1 or less: noise leaves out a direction, or the error is too large.
 DROWNED = "noise drowns a direction of the iterates, in which an eigenvalue of -1 or less may lie: needed less noise"
+NEAR = "the least eigenvalue, {:.3g}, may by its error {:.2g} be -1 or less: then no theta converges; give more vectors"
 
 _ERRORS = "estimated errors of both ends"
 _UNKNOWN: dict[str, Any] = {
@@ -89,6 +91,10 @@ _UNKNOWN: dict[str, Any] = {
 _COUNTS = "length of a vector, number of iterates, of those that were read, and of their independent differences"
 
 
+#: Vectors as rows, a power of 2 as their unit, so that no digit changes, and the accuracy of each row in it.
+Scaled = tuple[Floats, float, Floats]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Vectors(Evidence, Value):
     """Iterates and their images, as they were read.
@@ -97,8 +103,8 @@ class Vectors(Evidence, Value):
     FEWEST or more.  ``spectrum`` has ``ritz``, the Ritz values less 1, and modes between them; ``course`` is the
     largest lambda after fewer iterates, and after all; ``loaded`` is True where a node that is open in the last image
     bore a force in an iterate, so that its mode, lambda = 0, has a share in the error; ``period`` is the number of
-    steps after which iterates come back, 0 where they do not; ``drowned`` is True if noise left out a direction of a
-    general coupling; ``stays`` the size of the last residuals over T x where noise keeps them from falling, else 0.
+    steps after which iterates come back, 0 where they do not; ``drowned`` says why an eigenvalue of a general coupling
+    may be -1 or less; ``stays`` is the last residual over T x where it does not fall, above 1 of an explosion, else 0.
     An end is found if it no longer changes with more directions: the least one as the exchanged roles need it, in 1 +
     1/lambda, and the largest one in 1 + lambda.
     """
@@ -140,7 +146,7 @@ class Vectors(Evidence, Value):
     course: tuple[float, ...]
     loaded: bool
     period: int
-    drowned: bool
+    drowned: str
     stays: float = 0.0
 
     @cached_property
@@ -196,7 +202,7 @@ class Vectors(Evidence, Value):
         if why := self.no_map or self.negative:
             return why
         if not self.settled:
-            return "contact still changes in the last iterates: continue the run, and give more of its vectors"
+            return "contact still changes in the last iterates, or slip: continue the run, and give more of its vectors"
         if self.high_found:
             return ""
         said = "rho is not found yet: these are too few independent directions" + " above the noise" * bool(self.noise)
@@ -209,10 +215,10 @@ class Vectors(Evidence, Value):
             said = f"rho seems to be {self.seen.high:.3g} with an error of {self.spectrum.error_high:.2g}"
         elif len(self.course) > 1:
             said = f"rho changes with every iterate ({tops}), not found yet"
+        if self.stays > 1:
+            return f"{said}; the run explodes, which leaves only rounding of other modes: give its first iterates"
         if self.stays:
-            return (
-                f"{said}; ask for a residual above {2 * self.stays:.1g}: the noise of the solvers keeps it from falling"
-            )
+            return f"{said}; ask for a residual above {2 * self.stays:.1g}: the noise keeps it from falling"
         return f"{said}; continue the run with IQN-ILS, and give more of its vectors"
 
     @property
@@ -241,13 +247,13 @@ class Vectors(Evidence, Value):
         if self.kind.signed and self.ritz.real.max() < -REAL:
             return f"all eigenvalues seem to be negative, which these make: {causes}"
         error = self.spectrum.error_low if self.spectrum.error_low <= 1 + least else 0.0  # a larger one is no excuse
-        below_0 = self.kind.linear and least < -max(REAL / 2 * (1 + abs(self.spectrum.high)), error)
+        below_0 = least < -max(REAL / (1 + self.kind.linear) * (1 + abs(self.spectrum.high)), error)
         if self.kind.signed and (least <= RANK - 1 or below_0):
             return f"{said}, which these make: {causes}"
         if self.kind.parallel and not self.spectrum.parallel().theta:
             return "by these eigenvalues no theta above 0 converges with both solvers at once: run one after the other"
         too = f"with -1 or less no theta above 0 converges; {MEMORY}, makes such eigenvalues too"
-        return f"{said}: {too}" if least <= RANK - 1 else DROWNED * self.drowned
+        return f"{said}: {too}" if least <= RANK - 1 else self.drowned
 
 
 def seen_in(
@@ -294,20 +300,27 @@ def seen_in(
     unsure = (noise or 0.0) * float(np.abs(values).max())
     low, high = (max(_error(values, residuals, i), unsure) for i in (0, -1))
     negative = kind.signed and bool(values[0].real < 1 - max(REAL, low))
+    later = list(_later(X, TX, inside, kind)) if noise is None else []  # else that shows whether T is one map
+    moves = [np.abs((found[[0, -1]] - values[[0, -1]]).real) for found, _ in later]
+    if later and LOUD * moves[0][0] > later[0][1][0]:  # more than its residual explains where T is linear
+        low = max(low, float(moves[0][0]))
     sizes = np.abs(values)
     modes = _modes(values, residuals / np.maximum(sizes, RANK * sizes.max()), unknowns)
-    spectrum = Spectrum(values=modes - 1, source="vectors", error_low=low, error_high=high)
+    spectrum = Spectrum(values=modes - 1, source="vectors")
     before = _before(X, TX, inside, len(values), kind)
     steady = lambda ends, within=STEADY: len(before) > 0 and max(ends) <= (1 + within) * min(ends)
     whole = len(values) == unknowns
-    known = [whole or bool(residuals[i] <= INVARIANT * abs(values[i])) for i in (0, -1)]
-    tops = [float(found[-1].real) for found in (*before, values)]
-    least = [float(found[0].real) - 1 for found in (*before, values)]
+    known = [whole or bool(residuals[i] <= INVARIANT * abs(values[i]) and stays <= 1) for i in (0, -1)]
+    slips = not (kind.linear or spectrum.real) and bool((np.array(moves) > LOUD * values[-1].real).any())
+    drowned = NEAR.format(values[0].real - 1, low) if low >= values[0].real else ""
+    drowned = DROWNED if apart and _rank(X, inside) > len(values) else drowned
+    tops, least = ([float(found[i].real) - (not i) for found in (*before, values)] for i in (-1, 0))
     course = tuple(top - 1 for top in tops[-1 if known[1] else 0 :])
     slows = len(tops) > FEWER and 0 <= tops[-1] - tops[-2] <= tops[-2] - tops[-3]
     rises = slows and not steady(tops) and steady(tops, RISING) and (spectrum.real or not kind.signed)
-    if rises and not known[1]:
-        spectrum = replace(spectrum, error_high=max(high, tops[-1] - tops[0]))
+    moved = max(least) - least[-1], tops[-1] - (tops if rises else tops[-2:])[0]  # they may move as far again
+    low, high = (max(error, far * (not sure)) for error, far, sure in zip((low, high), moved, known, strict=True))
+    spectrum = replace(spectrum, error_low=low, error_high=high)
     return Vectors(
         kind=kind,
         unknowns=unknowns,
@@ -317,7 +330,7 @@ def seen_in(
         spectrum=spectrum,
         symmetric=spectrum.real,
         changing=changing or ((changed or negative) and not kind.linear),
-        settled=not changing or last >= FEWEST,
+        settled=not (slips or (changing and last < FEWEST)),
         ritz=values - 1,
         noise=noise,
         apart=apart,
@@ -326,16 +339,15 @@ def seen_in(
         course=course,
         loaded=loaded,
         period=_period(X),
-        drowned=bool(apart) and not kind.signed and _rank(X, inside) > len(values),
+        drowned=drowned * (not kind.signed),
         stays=stays if noise else 0.0,
     )
 
 
 def _rank(X: Floats, inside: NDArray[np.bool_]) -> int:
     """The number of independent differences of iterates, each of length 1."""
-    D = np.diff(X, axis=0)[inside]
-    lengths = np.linalg.norm(D, axis=1)
-    D = D[lengths > 0] / lengths[lengths > 0, None]
+    D = np.diff(X, axis=0)[inside & (X[1:] != X[:-1]).any(axis=1)]
+    D /= np.linalg.norm(D, axis=1, keepdims=True)
     return int(np.linalg.matrix_rank(D, tol=RANK * np.sqrt(len(D)))) if len(D) else 0
 
 
@@ -353,18 +365,23 @@ def unsymmetric(kind: Kind, spectrum: Spectrum, course: Sequence[float]) -> str:
 
 
 def _before(X: Floats, TX: Floats, inside: NDArray[np.bool_], directions: int, kind: Kind) -> list[Complex]:
-    """Ritz values of fewer iterates, up to FEWER directions fewer; empty where fewer than LEFT would be left."""
+    """Ritz values of fewer iterates, up to FEWER directions fewer; empty where none would be left."""
     found: list[Complex] = []
-    for count in range(len(X) - 1, LEFT, -1):
-        try:
+    with suppress(ValueError):
+        for count in range(len(X) - 1, 1, -1):
             values = _ritz(X[:count], TX[:count], inside[: count - 1], kind)[0]
-        except ValueError:
-            return []
-        if len(values) < directions and all(len(values) < len(more) for more in found):
-            found.append(values)
-        if len(values) <= directions - FEWER:
-            return found[::-1] if len(values) >= LEFT else []
+            if len(values) < min([directions, *map(len, found)]):
+                found.append(values)
+            if len(values) <= directions - FEWER:
+                return found[::-1]
     return []
+
+
+def _later(X: Floats, TX: Floats, inside: NDArray[np.bool_], kind: Kind) -> Iterator[tuple[Complex, Floats]]:
+    """Ritz values and residuals without the first iterates."""
+    with suppress(ValueError):
+        for count in range(1, min(LEFT_OUT, len(X) - 3) + 1):
+            yield _ritz(X[count:], TX[count:], inside[count:], kind)[:2]
 
 
 def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_], kind: Kind) -> tuple[Complex, Floats, float | None]:
@@ -375,20 +392,18 @@ def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_], kind: Kind) -> tuple
     accuracy, half = _accuracy(X, TX), X.shape[1] // 2
     lost = np.zeros((1, 1))
     if kind.parallel:
-        parts = slice(half), slice(half, None)
-        one, other = (Field.of(X[:, of], TX[:, of], accuracy) for of in parts)
-        images = [replace(field, rows=TX[:, of]) for field, of in zip((one, other), parts, strict=True)]
-        U, there, noise = _images(one, images[1], inside)
-        V, back, more = _images(other, images[0], inside)
+        one, other = (_scaled(X[:, of], TX[:, of], accuracy) for of in (slice(half), slice(half, None)))
+        U, there, noise = _images(one, (TX[:, half:], *other[1:]), inside)
+        V, back, more = _images(other, (TX[:, :half], *one[1:]), inside)
         lost = np.linalg.norm(back, 2) * (there - V @ (V.T @ there))  # what no image of the other field is known of
         A, noise = U - back @ (V.T @ there), max((each for each in (noise, more) if each is not None), default=None)
     else:
-        field = Field.of(X, TX, accuracy)
-        fixed = bool(np.abs(TX - X).max() <= field.accuracy * field.unit)
+        rows, unit, accurate = _scaled(X, TX, accuracy)
+        fixed = bool(np.abs(TX - X).max() <= accurate[-1] * unit)
         same = "T x" if fixed else "T x - x"
         still = f"{same} {'= x' if fixed else 'is the same'} for every iterate, up to rounding: "
         still += SOLVED if fixed else SHIFTED
-        U, A, noise = _images(field, replace(field, rows=X - TX), inside, still)
+        U, A, noise = _images((rows, unit, accurate), (X - TX, unit, accurate), inside, still)
     values, vectors = np.linalg.eig(U.T @ A)
     order = np.argsort(values.real)
     values, vectors = values[order], vectors[:, order]
@@ -398,39 +413,32 @@ def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_], kind: Kind) -> tuple
     return values, residuals, noise
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Field:
-    """Vectors as rows, a power of 2 as their unit, so that no digit changes, and their accuracy in it."""
-
-    rows: Floats
-    unit: float
-    accuracy: float
-
-    @classmethod
-    def of(cls, rows: Floats, images: Floats, accuracy: float) -> Field:
-        """Iterates of one field beside its images, whose largest entry has this relative accuracy."""
-        largest = float(np.abs(images).max())
-        unit = math.ldexp(1.0, math.frexp(max(largest, float(np.abs(rows).max())))[1])
-        return cls(rows=rows, unit=unit, accuracy=accuracy * largest / unit)
+def _scaled(rows: Floats, images: Floats, accuracy: float) -> Scaled:
+    """Iterates of a field beside its images, accurate to a share of the largest entry so far: a run may explode."""
+    largest = np.maximum.accumulate(np.abs(images).max(axis=1))
+    unit = math.ldexp(1.0, math.frexp(max(largest[-1], float(np.abs(rows).max())))[1])
+    return rows, unit, accuracy * largest / unit
 
 
 def _images(
-    given: Field, taken: Field, inside: NDArray[np.bool_], still: str = ""
+    given: Scaled, taken: Scaled, inside: NDArray[np.bool_], still: str = ""
 ) -> tuple[Floats, Floats, float | None]:
     """An orthonormal basis of the differences of some rows, what a linear map to others makes of it, and its noise.
 
     ``still`` is the error where the others do not differ; empty where they may be the same.
     """
-    D, E = (np.diff(field.rows, axis=0)[inside].T / field.unit for field in (given, taken))
-    lengths = np.linalg.norm(D, axis=0)
-    kept, again = lengths > ROUNDING * given.accuracy, lengths == 0
+    D, E = (np.diff(rows, axis=0)[inside].T / unit for rows, unit, _ in (given, taken))
+    accurate, accuracy = (each[1:][inside] for *_, each in (given, taken))
+    lengths, again = np.linalg.norm(D, axis=0), ~D.any(axis=0)
+    kept = lengths > ROUNDING * accurate
     if not kept.any():
         raise ValueError("the iterates do not differ above rounding: needed two different ones")
     changes = np.linalg.norm(E, axis=0)
     loud = float(changes[again].max(initial=0.0))
     kept = heard if (heard := kept & (LOUD * changes > loud)).any() else kept
-    D, E = D[:, kept] / lengths[kept], E[:, kept] / lengths[kept]
-    if still and (np.linalg.norm(E, axis=0) <= taken.accuracy / lengths[kept]).all():
+    lengths, accuracy = lengths[kept], accuracy[kept]
+    D, E = D[:, kept] / lengths, E[:, kept] / lengths
+    if still and (np.linalg.norm(E, axis=0) <= accuracy / lengths).all():
         raise ValueError(still)
     U, sigma, Vt = np.linalg.svd(D, full_matrices=False)
     images = E @ Vt.T
@@ -439,7 +447,7 @@ def _images(
     largest = float((sizes[~rest] / sigma[~rest]).max()) or 1.0
     more = np.linalg.norm(E - images @ Vt, axis=0) if D.shape[1] > len(D) else []  # of more differences than unknowns
     noise = float(max([*sizes[rest], *more])) / largest if rest.any() or len(more) else None
-    rounding = np.sqrt(((Vt * (max(taken.accuracy, loud) / lengths[kept])) ** 2).sum(axis=1)) / largest
+    rounding = np.sqrt(((Vt * (np.maximum(accuracy, loud) / lengths)) ** 2).sum(axis=1)) / largest
     used = ~rest & (sigma * CLEAN >= np.maximum(rounding, noise or 0.0))
     if not used.any():
         used = sigma == sigma[0]
@@ -489,12 +497,13 @@ def _stays(X: Floats, TX: Floats, fields: int) -> float:
 
     Of several fields the larger one counts; 0 elsewhere, and of few iterates.
     """
-    sizes = (np.linalg.norm(rows.reshape(len(X), fields, -1), axis=2) for rows in (TX - X, TX))
+    sizes, images = (np.linalg.norm(rows.reshape(len(X), fields, -1), axis=2) for rows in (TX - X, TX))
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.divide(*sizes).max(axis=1)
+        shares = (sizes / images).max(axis=1)
     third = len(X) // 3
     stays = float(np.median(shares[-third:]))
-    return stays if third >= FEWEST and 1.25 * stays >= np.nanmin(shares[:-third]) else 0.0
+    known = third >= FEWEST and (stays <= 1 or bool((LOUD * sizes[-1] > sizes[0]).any()))
+    return stays if known and 1.25 * stays >= np.nanmin(shares[:-third]) else 0.0
 
 
 def last_piece(TX: Floats) -> int:
@@ -532,4 +541,5 @@ def _error(values: Complex, residuals: Floats, end: int) -> float:
     """
     others = np.delete(np.abs(values - values[end]), end)
     residual, gap = float(residuals[end]), float(others.min(initial=np.inf))
-    return min(residual, max(residual**2 / gap if gap else residual, MARGIN * float(abs(values[end]))))
+    squared = residual**2 / gap if gap and not values.imag.any() else residual
+    return min(residual, max(squared, MARGIN * float(abs(values[end]))))
