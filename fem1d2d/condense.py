@@ -393,7 +393,7 @@ def _factor(matrix: sp.csc_array, order: Ints | None) -> Any:
 
 
 def _last_block(factor: Any, i: int) -> NDArray[Any]:
-    """What elimination leaves of all unknowns but the first i, from the factors of the whole matrix."""
+    """The Schur complement of all unknowns but the first i, from the factors of the whole matrix."""
     # the last rows and columns, unless SuperLU moved some that do not depend on each other
     last = factor.perm_c[i:]
     L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
