@@ -61,7 +61,7 @@ def check(exercise: str, answer: Any) -> str:
         return str(error)
     if not off:
         return "right"
-    if not hints and (digits := min(_rounded(given[n], right[n]) for n in off)):  # one digit is no evidence
+    if not hints and (digits := min(_rounded(given[n], right[n]) for n in off)):  # one digit shows nothing
         return "Right as far as it goes; give three digits." if digits > 1 else "Give three digits."
     if shuffled:
         hints += [f"These are the right answers in another order; needed {asks}."]

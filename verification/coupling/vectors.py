@@ -246,7 +246,7 @@ class Vectors(Evidence, Value):
         said, causes = f"an eigenvalue seems to be {least:.3g}", self.kind.given("contact that changes, ") + WRONG_SIGN
         if self.kind.signed and self.ritz.real.max() < -REAL:
             return f"all eigenvalues seem to be negative, which these make: {causes}"
-        error = self.spectrum.error_low if self.spectrum.error_low <= 1 + least else 0.0  # a larger one is no excuse
+        error = self.spectrum.error_low if self.spectrum.error_low <= 1 + least else 0.0  # a larger one excuses nothing
         below_0 = least < -max(REAL / (1 + self.kind.linear) * (1 + abs(self.spectrum.high)), error)
         if self.kind.signed and (least <= RANK - 1 or below_0):
             return f"{said}, which these make: {causes}"
