@@ -156,7 +156,7 @@ def test_a_threshold_is_a_friction_whose_number_is_below_1(section_6, monkeypatc
     """Made-up numbers ``c = k``, of which none is proved beyond 1 where ``proved_below`` says so."""
     tried = {}
 
-    def number(forms, near):
+    def number(forms, near, *, stop):
         k = tried["last"] = forms.friction
         tried[k] = k
         if k >= proved_below:

@@ -144,28 +144,27 @@ def locate(pair: ContactPair, measured: Measured, *, progress: Progress = silent
     X = (A + x + math.sqrt(x * m)) / m  # (5.11)
     with one_thread():
         forms = LossForms(pair)
-        N_1, N_2, dual, d_2 = forms.N_1, forms.N_2, forms.dual, forms.d_2
-        size2, norm = square(d_2, N_2), square(forms.root, dual)
+        N_1, dual = forms.N_1, forms.dual
 
-        def found(factors: Factors, against: Floats | None = None) -> float:
-            """The largest value of a quadratic form against another one, the norm (5.21) by default."""
+        def found(factors: Factors, over: Floats | None = None) -> float:
+            """The largest value of a quadratic form over another one of the force, the norm (5.21) by default."""
             progress("searching what the inequalities lose", next(done) / SEARCHES)
             random = np.random.default_rng(0)
-            return worst_piece(pair, factors, against=against, random=random, starts=STARTS).value
+            return worst_piece(pair, factors, gram=over, random=random, starts=STARTS).value
 
-        def force(gram: Floats, against: Floats | None = None) -> float:
+        def force(gram: Floats, over: Floats | None = None) -> float:
             """``|T psi - T psi~|`` in a norm, squared."""
-            return found(lambda some: squared(some.force, gram), against)
+            return found(lambda some: squared(some.force, gram), over)
 
-        def trace(against: Floats | None = None) -> float:
+        def trace(over: Floats | None = None) -> float:
             """``|w^1 - w~^1|_1``, squared."""
-            return found(lambda some: squared(some.d_1, N_1), against)
+            return found(lambda some: squared(some.d_1, N_1), over)
 
         # suprema against e = |||psi - psi~|||, squared
         F = found(lambda some: some.friction)
         t, t_dual, d1 = force(forms.inverse), force(dual), trace()
         # and against other norms
-        ratio, T_dual = trace(size2), force(dual, norm)
+        ratio, T_dual = trace(square(forms.inverse, forms.N_2)), force(dual, dual)
         eigen = suprema(forms)
     d2, psi_dual = eigen.displacement, eigen.force
 

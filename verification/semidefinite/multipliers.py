@@ -156,7 +156,7 @@ class QuadraticForms(Conditions):
         return _root(Certified(value=safe, evaluated=evaluated, proposed=math.nan, multipliers=multipliers))
 
     @one_thread()
-    def friction_number(self, near: Start | None = None) -> Certified:
+    def friction_number(self, near: Start | None = None, *, stop: Stop = USUAL) -> Certified:
         """The least c with ``<g, p> <= c |g|^2`` that multipliers prove: every small theta contracts where c < 1.
 
         ``near`` is from the friction number at a friction nearby.  LMIError where none do.
@@ -165,7 +165,7 @@ class QuadraticForms(Conditions):
         fixed, start = -self.cross, None
         if near is not None:
             start = self.program(fixed, self.everywhere, self._from(near), (1 + NEARBY) * near[0])
-        found, proposal = self._least(fixed, self.towards_zero, 1.0, holds, self.everywhere, start=start)
+        found, proposal = self._least(fixed, self.towards_zero, 1.0, holds, self.everywhere, stop, start)
         return replace(found, early=self._early(proposal))
 
     def _from(self, near: Start) -> Weights:
@@ -371,24 +371,30 @@ def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, p
         nonlocal near
         progress(f"semidefinite bound: friction threshold, k = {k:.3g} is tried", None)
         try:
-            found = QuadraticForms(pair, measured, friction=k).friction_number(near)
+            found = QuadraticForms(pair, measured, friction=k).friction_number(near, stop=Stop(accuracy=NARROW / 10))
         except LMIError:  # nothing is proved at this friction
-            return -1.0
+            return math.nan
         near = found.early
         return 1 - found.value
 
-    low, high, k = 0.0, float("inf"), start
-    while high - low > NARROW * high or high == float("inf"):
-        if high < LEAST * start:
-            raise LMIError(f"no friction above {high:.1e} leaves multipliers that prove anything")
+    low, high, k = (0.0, 1.0), (math.inf, math.nan), start
+    while not _root_near(low, high):
+        if high[0] < LEAST * start:
+            raise LMIError(f"no friction above {high[0]:.1e} leaves multipliers that prove anything")
         left = spare(k)
         if left > 0:
-            low = k
+            low = k, left
         else:
-            high = k
+            high = k, left
         guess = k / max(1 - left, 1e-3)  # c grows about linearly with k
         inside = 0.3 * NARROW * guess
         k = guess + inside if left > 0 else guess - inside
-        if not low < k < high:
-            k = (low + high) / 2
-    return low
+        if not low[0] < k < high[0]:
+            k = (low[0] + high[0]) / 2
+    return low[0]
+
+
+def _root_near(low: tuple[float, float], high: tuple[float, float]) -> bool:
+    """True if k and what is left of 1 show a root within NARROW of the lower k: by their bracket, or by the chord."""
+    (k, left), (above, lacking) = low, high
+    return above - k <= NARROW * above < math.inf or (above - k) * left <= NARROW * k * (left - lacking)

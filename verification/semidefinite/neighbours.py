@@ -80,12 +80,12 @@ def form_of(factors: tuple[Floats, Floats]) -> Floats:
     return symmetric(form)
 
 
-def answers(piece: Piece) -> Responses:
-    """Answers of T on one piece to the forces ``g = L y``, a row for each component of y; ``|y|`` is their norm."""
+def answers(piece: Piece, root: Floats | None = None) -> Responses:
+    """Answers of T on one piece to the columns of a root, a row each; by default of L, whose length is 1 in (5.21)."""
     pair = piece.pair
-    root = pair.neumann.root
+    root = pair.neumann.root if root is None else root
     jump = piece.jump @ root
-    carried = pair.interface.carry(pair.neumann.flexibility(root))
+    carried = pair.interface.carry(pair.neumann.inverse @ root)
     return Responses(pair=pair, g=root.T, d_1=(carried + jump).T, jump=jump.T, reaction=(piece.reaction @ root).T)
 
 
@@ -165,7 +165,7 @@ class Neighbours:
         The third are the factors on the pattern itself, shape (m, ..).
         """
         pair, at = self._pair, self._at
-        carried, bound = pair.interface.carry(pair.neumann.flexibility(forces)), _bound(pair, forces, self._sign)
+        carried, bound = pair.interface.carry(pair.neumann.inverse @ forces), _bound(pair, forces, self._sign)
         held = np.where(pair.contact.free[:, None], carried, 0.0)
         given = np.where(self._moves[:, None], 0.0, held)
         wanted = np.where(self._moved[..., None], 0.0, held[at])

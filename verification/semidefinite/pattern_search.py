@@ -14,11 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
+from scipy.linalg import cholesky, eigh, eigvalsh, solve_triangular
 from scipy.linalg.lapack import dpotrf
 
 from fem1d2d.mesh import Bools, Floats
@@ -48,17 +49,28 @@ DIGITS = 9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FoundFactor:
-    """A piece that a search came to, the largest ``value`` of the form on it, and its eigenvalues, the largest last."""
+    """A piece that a search came to, and the largest ``value`` of the form on it, at the change of force ``worst``.
+
+    ``form`` is its matrix in y with ``g = root y``.
+    """
 
     value: float
     piece: Piece
-    eigenvalues: Floats
-    eigenvectors: Floats
+    worst: Floats
+    form: Floats
+    root: Floats
 
-    @property
+    @cached_property
     def size(self) -> float:
-        """The largest modulus of the eigenvalues: rounding is a share of it."""
-        return float(np.abs(self.eigenvalues).max())
+        """The largest modulus of an eigenvalue: rounding is a share of it."""
+        if dpotrf(self.form + self.value * np.eye(len(self.form)))[1] == 0:  # no eigenvalue is below -value
+            return self.value
+        return float(np.abs(eigvalsh(self.form)).max())
+
+    def modes(self) -> tuple[Floats, Floats]:
+        """All eigenvalues, the largest last, and the changes of force of the eigenvectors as columns."""
+        values, vectors = eigh(self.form, check_finite=False)
+        return values, self.root @ vectors
 
 
 def signs(pair: ContactPair) -> Signs:
@@ -79,12 +91,14 @@ class Search:
 
     The loads of ``pair`` do not matter, as each piece occurs for suitable ones.
 
-    ``factors`` are of the form (:data:`verification.semidefinite.neighbours.Factors`); ``against`` is the form whose
-    value is 1, in y with ``g = L y``: the identity, the norm (5.21), by default.
+    ``factors`` are of the form (:data:`verification.semidefinite.neighbours.Factors`).  Its values are for changes of
+    force with ``g' gram g = 1``, by default of length 1 in the norm (5.21).
     """
 
-    def __init__(self, pair: ContactPair, factors: Factors, *, against: Floats | None = None) -> None:
-        self.pair, self._factors, self._against = pair, factors, against
+    def __init__(self, pair: ContactPair, factors: Factors, *, gram: Floats | None = None) -> None:
+        self.pair, self._factors, root = pair, factors, pair.neumann.root
+        lengths = np.eye(root.shape[1]) if gram is None else cholesky(root.T @ gram @ root, lower=True)
+        self._root = root if gram is None else solve_triangular(lengths, root.T, lower=True).T
         tangential = (0, 1, -1) if pair.rubs else (1,)  # without friction every node slides
         self.states = [(touching, slide) for touching in (True, False) for slide in tangential]
         self.sign, self._still = signs(pair), np.zeros(pair.neumann.grid.n, dtype=bool)
@@ -128,15 +142,13 @@ class Search:
         if visited not in self._visited:
             if level >= self._below.get(visited, np.inf):
                 return None
-            form = form_of(self._factors(answers(piece)))
-            if level > -np.inf:
-                against = np.eye(len(form)) if self._against is None else self._against
-                if dpotrf(level * against - form)[1] == 0:
-                    self._below[visited] = level
-                    return None
-            found, vectors = eigh(form, self._against, check_finite=False)
+            form = form_of(self._factors(answers(piece, self._root)))
+            if level > -np.inf and dpotrf(level * np.eye(len(form)) - form)[1] == 0:
+                self._below[visited] = level
+                return None
+            (value,), vectors = eigh(form, subset_by_index=[len(form) - 1] * 2, check_finite=False)
             self._visited[visited] = FoundFactor(
-                value=float(found[-1]), piece=piece, eigenvalues=found, eigenvectors=vectors
+                value=float(value), piece=piece, worst=self._root @ vectors[:, 0], form=form, root=self._root
             )
         known = self._visited[visited]
         return known if known.value > level else None
@@ -162,17 +174,17 @@ class Search:
         """Patterns that may be better, the most promising first: by the change of force that is worst on the best."""
         patterns, node = self.neighbours(best.piece.pattern)
         beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
-        forces, size = self.pair.neumann.root @ best.eigenvectors, best.size or 1.0
-        promised = np.round(beside.values(forces[:, -1]) / size, DIGITS)
+        size = best.size or 1.0
+        promised = np.round(beside.values(best.worst) / size, DIGITS)
         order = np.argsort(-promised, kind="stable")
         helps = order[promised[order] > np.round(best.value / size, DIGITS)]
         several = _several(best.piece.pattern, patterns, node, helps)
         if len(several.touching):
-            made = responses(self.pair, forces[:, -1], several, self.sign)
+            made = responses(self.pair, best.worst, several, self.sign)
             most = int(np.argmax(np.round(values(self._factors(made)) / size, DIGITS)))
             yield several.touching[most], several.sliding[most]
         yield from ((patterns.touching[i], patterns.sliding[i]) for i in helps)
-        exceeds = order[beside.exceed(level, best.eigenvalues, forces)[order]]
+        exceeds = order[beside.exceed(level, *best.modes())[order]]
         several = _several(best.piece.pattern, patterns, node, exceeds)
         yield from zip(several.touching, several.sliding, strict=True)
         yield from ((patterns.touching[i], patterns.sliding[i]) for i in exceeds)
@@ -183,9 +195,8 @@ class Search:
         if not len(node):  # a single contact node
             return
         beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
-        forces = self.pair.neumann.root @ best.eigenvectors
-        exceeds = np.flatnonzero(beside.exceed(level, best.eigenvalues, forces))
-        promised = np.round(beside.values(forces[:, -1])[exceeds] / (best.size or 1.0), DIGITS)
+        exceeds = np.flatnonzero(beside.exceed(level, *best.modes()))
+        promised = np.round(beside.values(best.worst)[exceeds] / (best.size or 1.0), DIGITS)
         for i in exceeds[np.argsort(-promised, kind="stable")]:
             yield patterns.touching[i], patterns.sliding[i]
 
@@ -206,13 +217,13 @@ class Search:
 
 
 def worst_piece(
-    pair: ContactPair, factors: Factors, *, random: np.random.Generator, against: Floats | None = None, starts: int = 4
+    pair: ContactPair, factors: Factors, *, random: np.random.Generator, gram: Floats | None = None, starts: int = 4
 ) -> FoundFactor:
     """Search the affine pieces of T for the largest value of a quadratic form; parameters as in :class:`Search`.
 
     The starts are: all nodes stick that can, all are open and slide one way, and random patterns.
     """
-    return _from_starts(Search(pair, factors, against=against), random=random, starts=starts)
+    return _from_starts(Search(pair, factors, gram=gram), random=random, starts=starts)
 
 
 def _from_starts(search: Search, *, random: np.random.Generator, starts: int) -> FoundFactor:
@@ -229,8 +240,7 @@ def factor_search(pair: ContactPair, theta: float, norm: ForceNorm | None = None
     def factors(found: Responses) -> tuple[Floats, Floats]:
         return squared(theta * found.force + (1 - theta) * found.g, gram)
 
-    root = pair.neumann.root
-    return Search(pair, factors, against=None if norm is None else root.T @ gram @ root)
+    return Search(pair, factors, gram=None if norm is None else gram)
 
 
 def largest_factor(

@@ -130,16 +130,14 @@ class Case:
 
     def search(self, label: str, starts: int = 2) -> FoundFactor:
         """As the losses are searched."""
-        root = self.pair.neumann.root
-        turned = lambda matrix: symmetric(root.T @ matrix @ root)
-        against = turned(self.forms(label, uniform_piece(self.pair, touching=False, sliding=1))[1])  # of every piece
+        over = self.forms(label, uniform_piece(self.pair, touching=False, sliding=1))[1]  # of every piece
         factors = {
             "(5.11)": lambda found: squared(found.d_1, self.N_1),
             "(5.16)": lambda found: squared(found.force, self.dual),
             "(5.38)": lambda found: squared(found.force, self.flexibility),
         }.get(label, lambda found: found.friction)
         random = np.random.default_rng(0)
-        return worst_piece(self.pair, factors, against=against, random=random, starts=starts)
+        return worst_piece(self.pair, factors, gram=over, random=random, starts=starts)
 
     def realised(self, label: str, piece: Piece, random: np.random.Generator) -> Sides:
         """Two forces in the worst direction of a piece, for loads that bring it about."""

@@ -257,7 +257,7 @@ def test_the_friction_threshold_lies_where_the_friction_number_reaches_1(seed):
 def test_where_no_friction_leaves_multipliers_that_prove_anything_no_threshold_is_named(monkeypatch):
     pair, measured, _, _ = case(2)
 
-    def fail(self, near):
+    def fail(self, near, *, stop):
         raise LMIError("made up")
 
     monkeypatch.setattr(QuadraticForms, "friction_number", fail)
