@@ -5,6 +5,7 @@ The positions of the rest are distances s along the line.  A line has one direct
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -44,27 +45,6 @@ class Line:
     points: Floats
     normals: Floats
     images: tuple[Floats | None, Floats | None] = (None, None)
-
-    @classmethod
-    def along(cls, mesh: Mesh, side: str, *, left: bool, mirrored: Bools | None = None) -> Line:
-        """Order the nodes of a named side, which is one line with two ends and without a sharp corner.
-
-        Parameters as of :meth:`parts`.
-
-        Raises
-        ------
-        MeshError
-            A side in several pieces, without ends, or with a corner of more than SHARPEST degrees.
-        """
-        line, *others = cls.parts(mesh, side, left=left, mirrored=mirrored)
-        for other in others:
-            if line.nodes[-1] == other.nodes[0]:
-                raise MeshError(line.corner(other, side))
-        if others:
-            raise MeshError(f"side {side!r} has several pieces, one of which ends at {place_of(line.points[-1])}")
-        if line.nodes[0] == line.nodes[-1]:
-            raise MeshError(f"side {side!r} is closed: needed a line with two ends")
-        return line
 
     @classmethod
     def parts(
@@ -309,16 +289,19 @@ def _turns(points: Floats) -> Floats:
 def chains(edges: Ints) -> list[Ints]:
     """The nodes of edges that follow each other, piece by piece; a closed piece ends where it begins.
 
+    A node at which several edges begin or end, as one at which two parts of a body touch, ends all pieces there.
+
     Examples
     --------
     >>> [nodes.tolist() for nodes in chains(np.array([[4, 5], [1, 2], [0, 1], [7, 8], [8, 7]]))]
     [[0, 1, 2], [4, 5], [7, 8, 7]]
     """
-    following = dict(edges.tolist())
-    open_ends = sorted(set(following) - set(following.values()))
+    outs, ins = (Counter(ends) for ends in edges.T.tolist())
+    following = {a: b for a, b in edges.tolist() if outs[a] == ins[a] == 1}  # inside a piece
+    begun = sorted(edge for edge in edges.tolist() if edge[0] not in following)
     found = []
-    while following:
-        piece = [open_ends.pop(0) if open_ends else min(following)]
+    while begun or following:
+        piece = begun.pop(0) if begun else [min(following)]
         while piece[-1] in following:
             piece.append(following.pop(piece[-1]))
         found.append(np.array(piece))
