@@ -165,9 +165,7 @@ class Condensation:
         """
         self._needs_definite()
         factor = _factor(self.matrix, self.order)
-        place = factor.perm_c  # in the factor, of each unknown in the order of elimination
-        if not np.array_equal(place, factor.perm_r):
-            raise ValueError("the matrix is singular to rounding: needed a definite one")
+        place = _places(factor)
         loaded = _solving(factor, self.order)(load)
         if not len(self.interface):  # of which LAPACK makes errors
             return Response(flexibility=np.zeros((0, 0)), loaded=loaded, field=lambda force: np.zeros(len(loaded)))
@@ -392,10 +390,20 @@ def _factor(matrix: sp.csc_array, order: Ints | None) -> Any:
         raise MeshError(SINGULAR) from None
 
 
+def _places(factor: Any) -> Ints:
+    """The place in the factor of each unknown in the order of elimination.
+
+    MeshError if a pivot lies beside the diagonal: one on it was 0.
+    """
+    if not np.array_equal(factor.perm_c, factor.perm_r):
+        raise MeshError(SINGULAR)
+    return np.asarray(factor.perm_c)
+
+
 def _last_block(factor: Any, i: int) -> NDArray[Any]:
     """The Schur complement of all unknowns but the first i, from the factors of the whole matrix."""
     # the last rows and columns, unless SuperLU moved some that do not depend on each other
-    last = factor.perm_c[i:]
+    last = _places(factor)[i:]
     L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
     return symmetric(L @ U)
 
@@ -409,9 +417,7 @@ def _by_columns(X: sp.csc_array, i: int) -> NDArray[Any]:
     n = X.shape[0]
     above = sp.block_array([[X[:i, :i], X[:i, i:]], [None, sp.eye_array(n - i, dtype=X.dtype)]], format="csc")
     factor = _factor(above, np.arange(n))
-    if not np.array_equal(factor.perm_r, factor.perm_c):  # a pivot beside the diagonal
-        return _last_block(_factor(X, np.arange(n)), i)
-    rows, last = np.sort(factor.perm_c[:i]), factor.perm_c[i:]
+    rows, last = np.sort(_places(factor)[:i]), factor.perm_c[i:]
     pivots, W = factor.U.diagonal()[rows], factor.U[:, last].tocsr()[rows]
     rest: NDArray[Any] = X[i:, i:].toarray()
     for start in range(0, i, ROWS):
