@@ -201,12 +201,15 @@ def _of_group(read: Read, group: Sequence[str], file: str = "it") -> Read:
 
 
 def with_pieces(read: Read) -> Read:
-    """Name the pieces of a surface that share no edge: ``all.1``, ``all.2`` of ``all``, in the order of the file."""
+    """Name the pieces of a surface that share no edge: ``all.1``, ``all.2`` of ``all``, in the order of the file.
+
+    Where the file itself has a surface of such a name, the name stays that surface's.
+    """
     piece, found = pieces(Cells(points=read.points, cells=read.triangles)), dict(read.surfaces)
     for name, members in read.surfaces.items():
         own = np.unique(piece[members])
         found |= {f"{name}.{n}": members[piece[members] == k] for n, k in enumerate(own, 1)} if len(own) > 1 else {}
-    return read._replace(surfaces=found)
+    return read._replace(surfaces={**found, **read.surfaces})
 
 
 def _plane_mesh(read: Read) -> Mesh:

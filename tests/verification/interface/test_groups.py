@@ -1,12 +1,14 @@
 """Bodies that are named surfaces of one mesh file."""
 
+from pathlib import Path
+
 import meshio
 import numpy as np
 import pytest
 from problem_list import blocks
 
 import verification as vf
-from fem1d2d import MeshError, from_file
+from fem1d2d import MeshError, from_file, mesh_files
 from verification.cli import main
 
 
@@ -81,6 +83,14 @@ def test_a_body_of_a_file_with_very_many_nodes_keeps_its_sides(tmp_path):
         "upper bottom": 4,
         "upper top": 4,
     }
+
+
+def test_a_surface_of_the_file_keeps_its_name_beside_the_pieces_of_another_one(tmp_path):
+    read = mesh_files.contents(Path(one_file(tmp_path / "both.msh", merged=False)))
+    surfaces = {"all": np.arange(64), "all.1": np.arange(32, 64)}
+    found = mesh_files.with_pieces(mesh_files.Read(*read[:4], surfaces, *read[5:])).surfaces
+    assert {name: len(of) for name, of in found.items()} == {"all": 64, "all.1": 32, "all.2": 32}
+    assert found["all.1"].tolist() == found["all.2"].tolist() == list(range(32, 64))
 
 
 @pytest.mark.parametrize(
