@@ -228,7 +228,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         return [plain(each) for each in value]
     if hasattr(value, "tolist"):  # an array, or a number of numpy
-        return value.tolist()
+        return plain(value.tolist())
     return str(value)
 
 
