@@ -309,9 +309,10 @@ def measures(points: NDArray[Any], cells: Ints) -> NDArray[Any]:
 
 
 def crossed(mesh: Mesh) -> bool:
-    """True if all cells are quadrilaterals split by both diagonals: such triangles do not lock near nu = 1/2.
+    """True if all cells are quadrilaterals split into four from a node inside.
 
-    Each has then one corner inside the body at which four triangles meet.
+    Each has then one corner inside the body at which four triangles meet.  Triangles of both diagonals do not lock near
+    nu = 1/2; a node beside the point where these cross makes them lock, the less the nearer it is.
 
     Examples
     --------

@@ -3,7 +3,8 @@
 :mod:`fem1d2d.mesh_files` runs it by its path, in isolated mode, so it imports nothing of this package.
 
 All cells become linear triangles.  A triangle of second order is cut through its middle nodes into four, a
-quadrilateral by both diagonals, with a node at its centre; one of second order is cut into four of first order before.
+quadrilateral from the mean of its corners into four, by both diagonals if it is a parallelogram; one of second order is
+cut into four of first order before.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fem1d2d import Condensation, MeshError, plane_strain, rectangle, stiffness
+from fem1d2d import Condensation, Mesh, MeshError, plane_strain, rectangle, solver, stiffness, supports
 from fem1d2d.layers import FacingLayers, Layer
 from fem1d2d.mesh import crossed, measures, rectangle_points
 
@@ -66,3 +66,27 @@ def test_near_incompressible_cells_that_both_diagonals_split_add_little_where_on
     assert largest["alternating"] == pytest.approx(alternating, rel=2e-3)
     assert largest["both"] < largest["alternating"]
     assert largest["both"] >= (3 - 4 * nu) * (1 - 1e-3)
+
+
+def test_cells_far_from_parallelograms_lock_unless_their_middle_lies_on_both_diagonals():
+    """Nodes inside moved by up to a quarter of a cell; the figures of the page on mesh files."""
+    flat = rectangle((0.0, 1.0), (0.0, 1.0), (8, 8), "both")
+    points, (_, corners) = flat.points.copy(), flat.quadrilaterals
+    inside = np.flatnonzero(((points[:81] > 0) & (points[:81] < 1)).all(axis=1))
+    points[inside] += (np.random.default_rng(0).random((len(inside), 2)) * 2 - 1) / 32
+    a, b, c, d = points[corners].transpose(1, 0, 2)
+    twice = lambda u, v: u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    crossing = a + (c - a) * (twice(b - a, d - b) / twice(c - a, d - b))[:, None]
+
+    def work(middles, nu):
+        mesh = Mesh(points=np.vstack([points[:81], middles]), cells=flat.cells, sides=flat.sides)
+        assert crossed(mesh)
+        free = ~supports(mesh, {"bottom": (0, 0)}).held.ravel()
+        top = np.unique(mesh.sides["top"])
+        load = np.zeros(mesh.points.shape)
+        load[top] = np.column_stack([np.ones(9), np.sin(3 * mesh.points[top, 0]) / 2]) / 9
+        A, f = stiffness(mesh, plane_strain(2 * (1 + nu), nu))[free][:, free].tocsc(), load.ravel()[free]
+        return f @ solver(A)(f)
+
+    lost = [1 - work(points[corners].mean(axis=1), nu) / work(crossing, nu) for nu in (0.4, 0.499, 0.4999)]
+    assert lost == pytest.approx([0.0001, 0.032, 0.108], abs=1e-3)
