@@ -38,12 +38,12 @@ class Layer:
     ----------
     material : Material
     aspect : float
-        Width over height of a cell, > 0; MeshError otherwise.
+        Width over height of a cell, > 0 and finite; MeshError otherwise.
     rising : bool
         True if the diagonal of the cell in column 0 below the surface runs from lower left to upper right.
     diagonals : {'alternating', 'uniform', 'both'}
         Alternating ones change from each cell to the next, along rows and columns, as those of
-        :func:`fem1d2d.rectangle`; of cells that are split by both the nodes in the middle are eliminated.
+        :func:`fem1d2d.rectangle`.  In cells that are split by both, the nodes in the middle are eliminated.
     rows : int or None
         Rows of cells above a clamped side; None for a half-plane.
     """
@@ -55,7 +55,7 @@ class Layer:
     rows: int | None = None
 
     def __post_init__(self) -> None:
-        if not self.aspect > 0:
+        if not 0 < self.aspect < np.inf:
             raise MeshError(f"aspect {self.aspect}: a positive number is needed")
         if not (self.rows is None or self.rows >= 1):
             raise MeshError(f"{self.rows} rows: at least one is needed")

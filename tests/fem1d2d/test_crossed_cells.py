@@ -90,3 +90,9 @@ def test_cells_far_from_parallelograms_lock_unless_their_middle_lies_on_both_dia
 
     lost = [1 - work(points[corners].mean(axis=1), nu) / work(crossing, nu) for nu in (0.4, 0.499, 0.4999)]
     assert lost == pytest.approx([0.0001, 0.032, 0.108], abs=1e-3)
+
+
+@pytest.mark.parametrize("aspect", [0.0, -1.0, np.nan, np.inf])
+def test_cells_without_a_positive_finite_aspect_are_refused(aspect):
+    with pytest.raises(MeshError, match=f"aspect {aspect}: a positive number is needed"):
+        Layer(material=plane_strain(1.0, 0.3), aspect=aspect)
