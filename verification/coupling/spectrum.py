@@ -23,7 +23,7 @@ BETWEEN = 20
 #: Steps are those until ``|T x - x| < 1e-6 |T x|``, as coupling libraries stop, from x = 0.
 TOLERANCE = 1e-6
 
-#: The accuracy of a theta.
+#: The accuracy of a theta as a share of its upper limit, which may be small.
 EXACT = {"xatol": 1e-9}
 
 #: The least error of an end that has not settled, as a share of 1 + lambda.
@@ -132,9 +132,9 @@ class Spectrum(Value):
             a, b = 1 + self.low, 1 + self.high + self.error_high
             if self.source != "vectors" or not TOLERANCE < a < (1 - TOLERANCE) * b:
                 return 2 / (a + b)
-            cost = lambda theta: max(math.log(z / TOLERANCE) / -math.log(abs(1 - theta * z)) for z in (a, b))
-            return float(minimize_scalar(cost, bounds=(1 / b, 2 / (a + b)), method="bounded", options=EXACT).x)
+            cost = lambda share: max(math.log(z / TOLERANCE) / -math.log(abs(1 - share * z / b)) for z in (a, b))
+            return float(minimize_scalar(cost, bounds=(1, 2 * b / (a + b)), method="bounded", options=EXACT).x) / b
         z = 1 + np.append(self.values, self.values[-1] + self.error_high)
         most = float((2 * z.real / np.abs(z) ** 2).min())  # from there on a mode grows
-        factor = lambda theta: float(np.abs(1 - theta * z).max())
-        return float(minimize_scalar(factor, bounds=(0, most), method="bounded", options=EXACT).x)
+        factor = lambda share: float(np.abs(1 - share * most * z).max())
+        return float(minimize_scalar(factor, bounds=(0, 1), method="bounded", options=EXACT).x) * most

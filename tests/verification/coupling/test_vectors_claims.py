@@ -6,6 +6,7 @@ from linear_couplings import Linear
 
 import verification as vf
 from verification.coupling.kinds import GENERAL, TIED
+from verification.coupling.spectrum import TOLERANCE, Spectrum
 from verification.coupling.vectors import seen_in
 from verification.registry import RULES
 
@@ -19,6 +20,17 @@ def test_a_run_that_explodes_keeps_what_its_first_rows_show(high):
     assert more.spectrum.high == pytest.approx(high, rel=1e-6)
     assert more.directions >= few.directions
     assert abs(more.spectrum.low - 0.5) <= more.spectrum.error_low < few.spectrum.error_low
+
+
+@pytest.mark.parametrize("high", [2.0, 1e3, 1e6, 1e9, 1e12])
+def test_the_theta_of_an_estimate_is_as_sharp_for_a_huge_rho_as_for_a_small_one(high):
+    ends = np.array([high / 20, high])
+    theta = Spectrum(values=ends.astype(complex), source="vectors").theta
+    soft, stiff = np.log((1 + ends) / TOLERANCE) / -np.log(np.abs(1 - theta * (1 + ends)))  # steps of both ends
+    assert soft == pytest.approx(stiff, rel=1e-4)
+    turning = Spectrum(values=high * np.array([0.05, 0.5 + 0.5j, 0.5 - 0.5j, 1.0]), source="eigenvalues")
+    best = min(turning.factor(turning.theta * share) for share in np.linspace(0.1, 3, 2000))
+    assert turning.factor(turning.theta) <= best + 1e-5
 
 
 def test_rows_in_which_an_explosion_has_left_one_direction_give_no_theta_and_the_words_say_so():
