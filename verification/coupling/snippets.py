@@ -173,7 +173,7 @@ def kratos(c: CouplingScheme, method: str) -> str:
 def norma(c: CouplingScheme, method: str) -> str:
     """The controller file and a boundary condition for each body; the domain listed first reads displacements."""
     if method != "constant":
-        raise ValueError(f"Norma, method {method!r}: needed 'constant', its relaxation has no other")
+        raise ValueError(f"Norma, method {method!r}: needed 'constant', the block has no other")
     one, other = c.neumann.lower(), c.contact.lower()
     contact = lambda source: (
         f"""\
@@ -215,7 +215,7 @@ def _with_point(number: float) -> str:
     return f"{mantissa}.0{e}{power}" if e and "." not in mantissa else f"{mantissa}{e}{power}"
 
 
-#: The libraries whose relaxation is constant.
+#: The libraries whose block has constant relaxation only; Norma.jl itself has Aitken's, too.
 ONLY_CONSTANT = ("Norma",)
 
 #: The snippets by the name of the library.
