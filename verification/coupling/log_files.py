@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Floats, Ints
 from verification.coupling.log_lines import ColumnsForm, Form, Residual, columns_of, form_of, form_of_pattern, to_try
 from verification.machine.interrupts import in_time
 from verification.problem.tables import ProblemError, short, unreadable
@@ -106,9 +107,7 @@ def read_log(path: Path, pattern: str | None = None, *, name: str | None = None,
     except TimeoutError:
         needed = f"searching it takes more than {seconds} s of processor time: needed no repeats inside repeats"
         raise _refused(path, f"{needed} (--pattern)") from None
-    if not any(np.isfinite(window).any() for column in log.columns for window in column.windows):
-        if not log.columns:
-            return log
+    if log.columns and not any(np.isfinite(window).any() for column in log.columns for window in column.windows):
         raise _refused(path, "needed residuals, every number of its columns is inf or nan")
     return replace(log, accelerator=log.accelerator or _quasi_newton_beside(path))
 
@@ -248,7 +247,7 @@ class _Lines:
         self.factors: list[str] = []  # Kratos 10 writes one figure of a constant one
         self.omega = False
         self.after: list[dict[int, list[float]]] = [{}]  # of each window, by the number of residuals before
-        self.field, self.before = "residual", 0
+        self.field, self.before = "residual", 0.0
         self.fresh: set[str] = set()  # fields that have begun the window
 
     def add(self, line: int, match: re.Match[str]) -> None:
@@ -256,7 +255,7 @@ class _Lines:
         found = match.groupdict() or {"residual": match[1]}
         self.waits = self.waits and (not self.once or any(found.values()))
         if found.get("iteration"):
-            iteration = int(self._value(line, found["iteration"]))
+            iteration = self._value(line, found["iteration"], int)
             if self.fresh and iteration <= self.before:
                 self.fresh.clear()
                 self.after.append({})
@@ -282,13 +281,13 @@ class _Lines:
     @property
     def _steps(self) -> int:
         """Number of residuals of the first field in this window."""
-        first = next(iter(self.windows), None)
-        return len(self.windows[first][-1]) if first in self.fresh and first is not None else 0
+        first = next(iter(self.windows), "")
+        return len(self.windows[first][-1]) if first in self.fresh else 0
 
-    def _value(self, line: int, word: str) -> float:
+    def _value(self, line: int, word: str, of: Callable[[float], float] = float) -> float:
         try:
-            return _number(word)
-        except ValueError:
+            return of(_number(word))
+        except (ValueError, OverflowError):  # int of nan, or of inf
             raise _refused(self.path, "needed a number", line, word) from None
 
     def aligned(self, lengths: Sequence[int]) -> tuple[Floats, ...]:
@@ -301,8 +300,7 @@ class _Lines:
 
 def _last_of(blocks: list[list[float]]) -> list[list[float]]:
     """Blocks without those that the next one repeats and continues."""
-    pairs = zip(blocks, [*blocks[1:], []], strict=True)
-    return [block for block, after in pairs if after[: len(block)] != block]
+    return [block for block, after in pairwise([*blocks, []]) if after[: len(block)] != block]
 
 
 # --- columns of numbers -----------------------------------------------------------------------------------------------
@@ -358,7 +356,7 @@ class _LogTable:
             return line.split()
         words = line.replace(",", ".").split(";") if self.separator == ";" else line.split(",")
         words = [word.strip() for word in words]
-        return words[:-1] if words and not words[-1] else words
+        return words if words[-1] else words[:-1]
 
     def log(self) -> Log:
         """The log that the table is."""
@@ -367,7 +365,7 @@ class _LogTable:
         found = next((name for name in _QUASI_NEWTON if name in names), None)
         if found is not None and "Iterations" in names and len(names) == data.shape[1]:
             counts, modes = (data[:, names.index(name)] for name in ("Iterations", found))
-            if modes.max() > 0:
+            if modes.max() > 0 and np.isfinite([counts, modes]).all():
                 return Log(
                     path=self.path,
                     form="preCICE",
@@ -376,22 +374,24 @@ class _LogTable:
                     counts=tuple(int(count) for count in counts),
                 )
         table = columns_of(names)
+        if table is None:
+            iteration, window, theta, residuals = self._roles(names, data.shape[1])
+        else:
+            residuals = [i for i, name in enumerate(names) if table.residuals.fullmatch(name)]
+            self.log10 |= table.log10
+        for i in residuals:
+            if self.log10:
+                data[:, i] = [_power(self.path, value) for value in data[:, i]]
+            for row in np.flatnonzero(data[:, i] < 0)[:1]:
+                received = f"{data[row, i]:g}"
+                raise _refused(self.path, f"needed a residual >= 0 in {names[i]}", self.numbers[row], received)
         if table is not None:
-            return self._of_table(table, names, data)
-        iteration, window, theta, residuals = self._roles(names, data.shape[1])
-        starts = self._starts(data, iteration, window)
-        ends = self.numbers
-        if len(ends) > 2 * LOOKED_AT:
-            ends = ends[:LOOKED_AT] + ends[-LOOKED_AT:]
+            return self._of_table(table, names, data, residuals)
+        starts = self._starts(data, np.arange(len(data)), iteration, window)
+        ends = self.numbers[:LOOKED_AT] + self.numbers[-LOOKED_AT:]
         words = list(zip(*(self._split(self.lines[line - 1]) for line in ends), strict=True))
         columns = []
-        if self.log10:
-            data[:, residuals] = np.vectorize(lambda value: _power(self.path, value))(data[:, residuals])
         for i in residuals:
-            wrong = np.flatnonzero(data[:, i] < 0)
-            if wrong.size:
-                received = f"{data[wrong[0], i]:g}"
-                raise _refused(self.path, f"needed a residual >= 0 in {names[i]}", self.numbers[wrong[0]], received)
             split = tuple(np.split(data[:, i], starts))
             columns.append(Column(name=names[i], residual=_kind(names[i]), windows=split, **_rounding(words[i])))
         factors = np.empty(0) if theta is None else data[:, theta]
@@ -406,19 +406,17 @@ class _LogTable:
             notes=tuple(self.notes),
         )
 
-    def _of_table(self, table: ColumnsForm, names: Sequence[str], data: Floats) -> Log:
+    def _of_table(self, table: ColumnsForm, names: Sequence[str], data: Floats, residuals: Sequence[int]) -> Log:
         """The log of a format of columns that is known by their names."""
-        at = {name: i for i, name in enumerate(names)}
-        rows = data[data[:, at[table.only]] == 1] if table.only else data
-        fields = rows[:, at[table.split]] if table.split else np.zeros(len(rows))
+        counted = np.flatnonzero(data[:, names.index(table.only)] == 1) if table.only else np.arange(len(data))
+        fields = data[counted, names.index(table.split)] if table.split else np.zeros(len(counted))
         columns = []
         for which in np.unique(fields):
-            own = rows[fields == which]
-            begins = own[1:, at[table.iteration]] <= own[:-1, at[table.iteration]]
-            for name in filter(table.residuals.fullmatch, names):
-                values = 10.0 ** own[:, at[name]] if table.log10 else own[:, at[name]]
-                windows = tuple(np.split(values, np.flatnonzero(begins) + 1))
-                of = f"{name}, {table.split} {which:g}" if table.split else name
+            rows = counted[fields == which]
+            starts = self._starts(data, rows, names.index(table.iteration), None)
+            for i in residuals:
+                windows = tuple(np.split(data[rows, i], starts))
+                of = f"{names[i]}, {table.split} {which:g}" if table.split else names[i]
                 columns.append(Column(name=of, residual=table.residual, windows=windows, digits=1e-8, decimals=0.0))
         if not columns:
             raise _refused(self.path, table.refused)
@@ -524,34 +522,27 @@ class _LogTable:
             raise _refused(self.path, f"columns {found}: needed one whose name has res, norm, abs or rel in it")
         return iteration, window, theta, residuals
 
-    def _starts(self, data: Floats, iteration: int | None, window: int | None) -> list[int]:
-        """The rows at which a time window begins, without the first one."""
-        begins = np.zeros(len(data), dtype=bool)
-        begins[self.again] = True
+    def _starts(self, data: Floats, rows: Ints, iteration: int | None, window: int | None) -> list[int]:
+        """The places in some rows at which a time window begins, without the first one."""
+        data, begins = data[rows], np.isin(rows, self.again)
         if window is not None:
             new = data[1:, window] != data[:-1, window]
             elapsed = new.all() and iteration is not None and (np.diff(data[:, iteration]) == 1).all()
             begins[1:] |= new & (not elapsed)  # a time that passes while iterations are counted
         if iteration is not None:
             counts = data[:, iteration]
-            wrong = np.flatnonzero(~np.isfinite(counts))
-            if wrong.size:
-                i = wrong[0]
-                raise _refused(self.path, "needed the number of the iteration", self.numbers[i], f"{counts[i]:g}")
+            for i in np.flatnonzero(~np.isfinite(counts))[:1]:
+                raise _refused(self.path, "needed the number of the iteration", self.numbers[rows[i]], f"{counts[i]:g}")
             begins[1:] |= counts[1:] <= counts[:-1]
-            missing = np.flatnonzero(~begins[1:] & (counts[1:] != counts[:-1] + 1)) + 1
-            if missing.size:
-                i = missing[0]
+            for i in np.flatnonzero(~begins[1:] & (counts[1:] != counts[:-1] + 1))[:1] + 1:
                 needed = f"needed iteration {counts[i - 1] + 1:g}: every iteration counts"
-                raise _refused(self.path, needed, self.numbers[i], f"{counts[i]:g}")
-        begins[0] = False
+                raise _refused(self.path, needed, self.numbers[rows[i]], f"{counts[i]:g}")
+        begins[:1] = False
         return [int(i) for i in np.flatnonzero(begins)]
 
     def _theta(self, values: Floats) -> float:
         """The relaxation factor that the log itself names."""
-        changes = np.flatnonzero(values != values[0])
-        if changes.size or not math.isfinite(values[0]):
-            i = changes[0] if changes.size else 0
+        for i in np.flatnonzero((values != values[0]) | ~np.isfinite(values))[:1]:
             changed = f"the relaxation factor changes from {values[0]:g} to {values[i]:g}: {RUN_AGAIN}"
             raise _refused(self.path, changed, self.numbers[i])
         return float(values[0])

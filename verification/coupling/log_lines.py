@@ -118,17 +118,17 @@ def columns_of(names: Sequence[str]) -> ColumnsForm | None:
 
 def to_try(text: str) -> str:
     """The nearest known format, and a pattern to try, for a log that none fits; empty for a table of numbers."""
-    lines = [line[:WIDEST] for line in text.splitlines()[:LOOKED_AT] if line.strip()]
+    lines = [line[:WIDEST] for line in text.strip().splitlines()[:LOOKED_AT] if line.strip()]
     if 2 * sum(bool(_NUMBER.match(line.split()[0])) for line in lines) > len(lines):
         return ""
     said, bare = [], [_NUMBER.sub("#", line) for line in lines]
-    likes = {
-        form.name: max(SequenceMatcher(None, _NUMBER.sub("#", one), line).ratio() for line in bare)
+    alike, nearest = max(
+        (SequenceMatcher(None, _NUMBER.sub("#", one), line).ratio(), form.name)
         for form in LOG_FORMATS.values()
         for one in form.example.splitlines()
-    }
-    nearest = max(likes, key=likes.__getitem__)
-    if likes[nearest] > ALIKE:
+        for line in bare
+    )
+    if alike > ALIKE:
         said.append(f"the nearest format is {nearest}")
     if match := next(filter(None, map(_RESIDUAL.search, lines)), None):
         words = re.sub(r"([^\w\s])", r"\\\1", _NUMBER.sub("0", match["before"].strip()))

@@ -131,6 +131,8 @@ def test_a_last_line_that_was_cut_off_costs_one_step_and_is_told(tmp_path, cut):
 
 
 ITERATIONS = "  TimeWindow  TotalIterations  Iterations  Convergence  QNColumns  DeletedQNColumns  DroppedQNColumns\n"
+SU2 = '"Time_Iter","Outer_Iter","bgs[P][0]"\n'
+ELMER = "! solver  ss/ns  timestep  coupled  nonlin  norm  change\n"
 
 BROKEN = {
     "nothing": ("", "this file is empty"),
@@ -146,6 +148,19 @@ BROKEN = {
     "unnamed columns": ("1 2\n3 4\n", "names of its 2 columns"),
     "no residual": ("force disp\n1 2\n3 4\n", "columns force, disp"),
     "counts of iterations": (ITERATIONS + "1 4 4 1 0 0 0\n", "convergence.log"),
+    "a count that is nan": (ITERATIONS + "1 4 nan 1 3 0 0\n", "convergence.log"),
+    "inf columns": (ITERATIONS + "1 4 4 1 inf 0 0\n", "convergence.log"),
+    "blank lines, then words": ("\n" * 50 + "the residual is small\nand smaller\n", "no line of numbers"),
+    "SU2, 10^400": (SU2 + "0,0,400.0\n0,1,399.0\n", "needed decimal logarithms"),
+    "SU2, each tenth iteration": (
+        SU2 + "0,0,-1.0\n0,10,-3.0\n0,20,-5.0\n",
+        "line 3: received '10', needed iteration 1",
+    ),
+    "Elmer, negative": (
+        ELMER + "1 1 1 1 1 1.7 0.2\n1 1 1 2 1 1.7 -0.1\n",
+        "line 3: received '-0.1', needed a residual",
+    ),
+    "Elmer, no steady state": (ELMER + "1 2 1 1 1 1.7 0.2\n1 2 1 2 1 1.7 0.1\n", "with 1 in the column ss/ns"),
     "kratos is silent": ("GaussSeidelStrong: Coupling iteration: 1 / 10\n", "echo_level"),
     "kratos, a word": ("Coupling iteration: 1 / 9\n abs-norm = x1 | abs-tol\n", "line 2: received 'x1', needed a nu"),
 }
@@ -161,6 +176,13 @@ def test_a_broken_log_is_refused_in_one_line_that_names_where(tmp_path, name):
     assert line.startswith(str(log))
     assert fragment in line
     assert "\n" not in line
+
+
+@pytest.mark.parametrize("word", ["nan", "inf"])
+def test_a_pattern_that_finds_no_number_of_an_iteration_is_refused_in_one_line(tmp_path, word):
+    log = written(tmp_path / "a.log", f"it 1 res 1.0\nit {word} res 0.5\n")
+    with pytest.raises(ProblemError, match=f"line 2: received '{word}', needed a number"):
+        advise_logs([(log, "0.5")], pattern=r"it (?P<iteration>\S+) res (?P<residual>\S+)")
 
 
 def test_a_factor_that_changes_by_no_rule_that_is_named_is_refused(tmp_path):

@@ -70,6 +70,8 @@ def test_the_example_of_a_format_is_known_by_itself_and_by_its_name(tmp_path, fo
     assert all(np.isfinite(window).all() for column in found.columns for window in column.windows)
     assert read_log(path, name=form.name).form == form.name
     assert form.program
+    if isinstance(form, Form) and "factor" in form.example:
+        assert found.theta is not None
 
 
 @pytest.mark.parametrize("form", LINES, ids=lambda form: form.name)
@@ -173,6 +175,7 @@ def test_a_log_that_no_format_fits_gets_a_pattern_that_reads_it(tmp_path, line):
 
 def test_the_nearest_format_is_named():
     assert "Kratos" in to_try('Convergence of "Force": Converged : no | abs-norm : 1.25 | abs_tol : 1e-9\n' * 3)
+    assert "Kratos" in to_try("Coupling iteration no 1 / 20\n" * 3)  # the first line of its example
     assert to_try("1 2.0 3.0\n" * 5) == ""
     assert form_of("nothing") is None
     assert columns_of(["residual"]) is None
