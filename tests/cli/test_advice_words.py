@@ -108,3 +108,20 @@ def test_the_help_offers_no_kind_that_is_refused(call):
     assert "general" not in call("advise", "moduli", "--help").out
     assert "general" in call("advise", "vectors", "--help").out
     assert "needed one of contact, tied" in call("advise", "moduli", *HEAT, "--kind", "general").complaint
+
+
+def test_a_bound_is_rounded_to_its_side_and_so_is_the_theta_that_it_excludes(call):
+    """rho is at least 85.47 in a tube, and theta diverges from 0.02313 on."""
+    tube = call("advise", "moduli", *FLUID[:-1], "0.05,0.005").out
+    assert "rho >= 85.4: added mass" in tube
+    assert "Theta from 0.0232 on diverges." in tube
+    heat = call("advise", "moduli", *HEAT).out  # rho = 100 with the roles exchanged
+    assert "0.0199" in heat
+
+
+def test_a_run_names_the_neumann_body_with_a_capital_and_no_option_that_is_refused(call):
+    run = ("advise", "run", "--theta", "0.9", "--ratio", "1.5")
+    assert "The Neumann body's solver reads forces" in call(*run, "--tied").out
+    assert "add --friction" in call(*run).out
+    assert "add --friction" not in call(*run, "--parallel").out
+    assert call(*run, "--parallel", "--friction").status == 2

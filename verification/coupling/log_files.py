@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from io import StringIO
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -229,8 +228,7 @@ def _read_lines(path: Path, text: str, form: Form, log10: bool) -> Log:
         for name, series in windows.items()
     )
     if accelerator is not None or not values:
-        rule: dict[str, Any] = {"accelerator": accelerator, "factors": factors}
-        return Log(path=path, form=form.name, columns=columns, notes=notes, **rule)
+        return Log(path=path, form=form.name, columns=columns, notes=notes, accelerator=accelerator, factors=factors)
     theta, rounding = _number(values[0]), _rounding(values[:1])
     off = (rounding["digits"] * theta + rounding["decimals"]) * form.rounded
     return Log(path=path, form=form.name, columns=columns, theta=theta, theta_rounding=off, notes=notes)

@@ -11,7 +11,7 @@ from verification.coupling.readings import NextRun, rounded_down
 from verification.coupling.sections import next_run, of, pasted, pasted_for, reads, which_body, which_method
 from verification.coupling.seen_moduli import Corners, ElasticBodies, ModuliRole, excluded_from
 from verification.coupling.waves import Fluid, Heat, Waves
-from verification.show.numbers import figures, near_one
+from verification.show.numbers import figures, near_one, rounded
 from verification.show.parts import Cell, Facts, Section, Sections, Table, closing, section, table
 
 #: What the bodies are called.
@@ -69,7 +69,7 @@ def _excluded(seen: ElasticBodies) -> Section:
     for role in seen.roles:
         bounds = seen.bounds(role)
         kinds = ((excluded_from(bounds.stick), stuck), (excluded_from(bounds.slide), "without friction"))
-        found = [f"{figures(theta)} and above {where}" for theta, where in kinds if theta is not None]
+        found = [f"{rounded(theta, 3, up=True)} and above {where}" for theta, where in kinds if theta is not None]
         notes.append(f"body {role.neumann_body}: {', '.join(found) or 'none up to 1 is excluded'}")
     return section("excluded", "WHICH THETAS CANNOT CONTRACT ON FINE MESHES?", *notes)
 
@@ -94,7 +94,7 @@ def _start(started: Sequence[ModuliRole], first: NextRun | None, parallel: bool)
         rate = near_one(start.factor_free(start.theta_free).value)
         notes += [
             f"{body}, without friction: theta = {start.theta_free:.4g}, factor {rate} a step, proved: rho_normal <="
-            f" {figures(float(start.s))} by the mirror image, in the continuum and on nested meshes",
+            f" {rounded(float(start.s), 3, up=True)} by the mirror image, in the continuum and on nested meshes",
             f"{body}, with friction: theta = {start.theta_guess:.4g}, a guess: rho at most {figures(start.guess)}, as"
             f" with {start.guessed_from}",
         ]
@@ -156,7 +156,8 @@ def _theta_of_heat(found: Advice, seen: Heat, names: Names) -> Section:
         theta = rounded_down(min(role.theta_tied or 0, LARGEST_TO_PASTE))
         best = figures(theta), near_one(role.factor_where_tied(theta) or 0)
         limit = None if role.rho_tied is None else excluded_from(role.rho_tied)
-        rows.append((names[role.neumann_body or 2], *ends, *best, "never" if limit is None else figures(limit)))
+        diverges = "never" if limit is None else rounded(limit, 3, up=True)
+        rows.append((names[role.neumann_body or 2], *ends, *best, diverges))
     thick, dt = "thickness" not in seen.given, seen.one("dt")
     of, over = f"flat {'thick ' * thick}plates: conductance of the plate that reads temperatures", "the other one's"
     if seen.first == "film":
@@ -189,10 +190,12 @@ def _bounds_of_fluid(found: Advice, seen: Fluid) -> Section:
     short = "" if "young" in seen.given else ", where steps in time are so short that stiffness does not count"
     where = "tube" if len(seen.given["length"]) == 2 else "square over the plate"
     notes = (
-        f"rho >= {figures(rho)}: added mass over the mass of the wall, for the longest wave{short}",
+        f"rho >= {rounded(rho.value, 3, up=False)}: added mass over the mass of the wall, for the longest wave{short}",
         f"Proved if the fluid fills the {where}, has no viscosity and is incompressible, and both solvers use one time "
         "scheme.",
-        f"Theta from {figures(2 / (1 + rho.value))} on diverges." if rho.value > 1 else "No theta up to 1 is excluded.",
+        f"Theta from {rounded(2 / (1 + rho.value), 3, up=True)} on diverges."
+        if rho.value > 1
+        else "No theta up to 1 is excluded.",
     )
     return section("bounds", "HOW LARGE IS RHO AT LEAST?", *notes)
 

@@ -197,8 +197,7 @@ def _text(path: Path, name: str) -> np.ndarray:
             cells = [cell.strip() for cell in line.split(separator)]
             if separator is not None and not cells[-1]:
                 cells.pop()  # a separator at the end of each line
-            if max(len(cells), len(rows) + 1) > MOST_ROWS:
-                _within(max(len(cells), len(rows) + 1))
+            _within(max(len(cells), len(rows) + 1))
             rows.append(_numbers(cells, number, first=not rows))
             if len(rows[-1]) != len(rows[0]):
                 raise _Refusal(f"line {number} has {len(rows[-1])} numbers: needed {len(rows[0])}, as in the first row")

@@ -78,7 +78,7 @@ def _end(runs: Runs, found: Advice, again: str) -> Section:
 
 def _assumed(runs: Runs) -> Section:
     """The assumption under which runs are read, before all else."""
-    free = not runs.kind.linear and not runs.rubs
+    free = not (runs.kind.linear or runs.kind.parallel or runs.rubs)
     otherwise = " With friction add --friction." if free else ""
     return section("assumed", "", Note(f"Assumed: {runs.assumes}.{otherwise}", 0))
 
@@ -146,7 +146,7 @@ def _seen(logs: Sequence[SeenLog], accelerated: Sequence[Accelerated]) -> Sectio
         parts.append(f"{one.accelerator}, {one.form}, {one.file}")
         parts += [Note(words, 4) for words in (one.says if one.factors is None else one.counted, *one.notes)]
     if logs:
-        steps = " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
+        steps = " and ".join(map(str, sorted({log.steps for log in logs}))) + " steps"
         parts.append(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}.")
     return section("logs", "WHAT DO THE LOGS SHOW?", *parts)
 

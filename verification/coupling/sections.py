@@ -156,7 +156,7 @@ def _which_body(found: Advice) -> Section:
 
 def reads(neumann: str, contact: str, forces: str = "forces", moves: str = "displacements") -> str:
     """The data that each solver reads and writes."""
-    return f"{neumann}'s solver reads {forces} and writes {moves}, {contact}'s the reverse.".capitalize()
+    return f"{neumann[0].upper()}{neumann[1:]}'s solver reads {forces} and writes {moves}, {contact}'s the reverse."
 
 
 def _which_theta(found: Advice) -> Section:
@@ -178,8 +178,7 @@ def _which_theta(found: Advice) -> Section:
         rows.append((name, figures(role.rho), "predicted", theta, near_one(rate), count(steps(rate)), bound))
         if role.factor_proved is not None and role.theta_proved is not None:
             q = role.factor_proved.value
-            level = role.factor_proved.level
-            factor = replace(near_one(q), level=level)
+            factor = replace(near_one(q), level=role.factor_proved.level)
             rows.append(("", "", "proved", figures(role.theta_proved), factor, count(steps(q), "<= "), ""))
         else:
             rows.append(("", "", "proved", NONE, NONE, NONE, "no conclusion"))
