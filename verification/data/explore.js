@@ -151,7 +151,7 @@ nd.onPage("explore", (figure) => {
       "Points: observed, of runs that converged. Dashed: predicted from rho, not a bound; its least value is marked. Line: bound in energy norms, in doubles, where it applies."));
     const ruler = new nd.Chart({ width: 360, height: 170, label: "Steps promised, predicted and taken", x: { low: 1, high: 1e4, log: true, name: `steps to ${short(data.tolerance)}` }, y: { low: 0, high: 4, bare: true, name: "" } });
     panel("How many steps?", ruler.root, nd.html("p", { class: "legend" },
-      "Green: the most steps the best bound allows, for any loads. Orange: steps predicted from rho, without friction. Blue: steps this run took."));
+      "Green: steps until the best bound promises the error to be that share of the first one, for any loads. Orange: steps predicted from rho, without friction. Blue: steps until the residual of this run was there."));
 
     function drawResiduals(run, i) {
       const seen = run.residuals.filter((r) => r > 0), low = Math.min(data.tolerance / 10, ...seen), high = Math.max(1, ...seen) * 2;
@@ -218,7 +218,7 @@ nd.onPage("explore", (figure) => {
       const rate = run.rate === null || run.outcome !== "converged" ? "" : `, at the end a step leaves ${number(run.rate)} of the error`;
       const most = drawRuler(role, run, best);
       says.textContent = `theta = ${number(data.theta[theta.value])}, k = ${number(data.friction[k])}, Neumann body ${role.neumann} (${role.name}): ${ended(run)}${rate}. `
-        + (best ? `For any loads a step leaves at most ${number(best[1])} of the error${most === null ? "" : `, so that at most ${most} steps are needed`}.` : "No bound says that a step contracts here.")
+        + (best ? `For any loads a step leaves at most ${number(best[1])} of the error${most === null ? "" : `, so that ${short(data.tolerance)} of the first error is left after at most ${most} steps`}.` : "No bound says that a step contracts here.")
         + (run.leftOut ? ` The bodies leave the picture: ${run.leftOut} of ${run.leftOut + run.shown.length} drawings of this run are left out.` : "");
       stageTitle.textContent = last < 0 ? "The bodies" : `The bodies at step ${run.shown[i]}`;
       stepText.textContent = last < 0 ? "none" : `${run.shown[i]} of ${run.steps}`;

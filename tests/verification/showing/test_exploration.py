@@ -238,6 +238,8 @@ def test_the_page_says_what_a_run_does(found, opened):
         assert f"Neumann body {made.pair.neumann_body} " in text
         assert int(re.search(r"after (\d+) steps", text)[1]) == made.iterations
         assert ("converged after" in text) == made.converged
+        assert "steps are needed" not in text  # bounds are of the error, and a run ends by its residual
+        assert ("of the first error is left after" in text) == ("For any loads" in text)
     assert opened.get_log("browser") == []
 
 
