@@ -228,8 +228,8 @@ def matrices(kind: Kind, snippets: str | None, as_json: bool, **given: Any) -> N
     "thetas",
     metavar="NUMBER",
     multiple=True,
-    help="Relaxation factor of the run, 0 < theta <= 1.  Give one for each log, in their order, or none if every log "
-    "names its factor or is of Aitken or quasi-Newton.",
+    help="Relaxation factor of the run, 0 < theta <= 1 (100 of kind general).  Give one for each log, in their order, "
+    "or none if every log names its factor or is of Aitken or quasi-Newton.",
 )
 @click.option(
     "--ratio",
@@ -420,7 +420,7 @@ def moduli(shape: dict[str, Any], kind: Kind, as_json: bool, **given: str | None
     data: dict[str, Any] = {name: value.split(",") for name, value in given.items() if value is not None}
     if not {"young", "conductivity", "film", "density"} & data.keys():
         received = f"received {f'--{min(data)} alone' if data else 'no material'}"
-        raise click.UsageError(f"{received}: needed --young and --poisson, --conductivity, or --density")
+        raise click.UsageError(f"{received}: needed --young and --poisson, --conductivity, --film or --density")
     from verification.coupling.from_moduli import advise_moduli
 
     try:

@@ -133,8 +133,8 @@ class Spectrum(Value):
             if self.source != "vectors" or not TOLERANCE < a < (1 - TOLERANCE) * b:
                 return 2 / (a + b)
             cost = lambda share: max(math.log(z / TOLERANCE) / -math.log(abs(1 - share * z / b)) for z in (a, b))
-            return float(minimize_scalar(cost, bounds=(1, 2 * b / (a + b)), method="bounded", options=EXACT).x) / b
+            return float(minimize_scalar(cost, bounds=(1, 2 * b / (a + b)), method="bounded", options=EXACT).x / b)
         z = 1 + np.append(self.values, self.values[-1] + self.error_high)
         most = float((2 * z.real / np.abs(z) ** 2).min())  # from there on a mode grows
         factor = lambda share: float(np.abs(1 - share * most * z).max())
-        return float(minimize_scalar(factor, bounds=(0, 1), method="bounded", options=EXACT).x) * most
+        return float(minimize_scalar(factor, bounds=(0, 1), method="bounded", options=EXACT).x * most)
