@@ -60,6 +60,7 @@ def test_a_certificate_of_other_bodies_or_of_a_false_claim_ends_with_1(call, wri
     file, target, _ = written
     assert call("certify", "--check", target, file, "--swap-roles").status == 1
     assert call("certify", "--check", target, file, "--set", "body1.young=7.1e4").status == 1
+    assert "received no FILE" in call("certify", "--check", target, "--set", "body1.young=7.1e4").complaint
     document = json.loads(target.read_text(encoding="utf-8"))
     document["claim"]["factor"] = "1/10"
     target.write_text(json.dumps(document), encoding="utf-8")

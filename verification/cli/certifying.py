@@ -96,8 +96,8 @@ def certify(
     ):
         if clash := [other for other in others if None not in (used[other], used[option])]:
             raise click.UsageError(f"received {clash[0]} with {option}: needed one of both")
-    if file is None and given is None:
-        raise click.UsageError("received nothing: needed FILE, or --check FILE.json")
+    if file is None and (given is None or keys or swap):
+        raise click.UsageError("received no FILE: needed it, or --check FILE.json without --set and --swap-roles")
     typed = Typed(file=file or Path(), keys=keys, theta=theta, swap=swap)
     problem: Any = None if file is None else load(typed)
     if given is not None:

@@ -209,12 +209,12 @@ def rows_of(given: dict[BodyNumber, tuple[Any, Any]], unknowns: Any, transfer: A
             raise ValueError(
                 f"S{body} and solve{body} have {' and '.join(map(str, sorted(sizes)))} rows: needed one size"
             )
-    if unknowns is not None and not (isinstance(unknowns, int) and unknowns > 0):
+    if unknowns is not None and not (isinstance(unknowns, int | np.integer) and unknowns > 0):
         raise ValueError(f"unknowns {unknowns!r}: needed a whole number > 0")
     rows: dict[int, int] = {}
     for body, sizes in told.items():
         others = told[3 - body] if transfer is None else set()
-        known = sizes or others or ({unknowns} if unknowns is not None else set())
+        known = sizes or others or ({int(unknowns)} if unknowns is not None else set())
         if not known:
             raise ValueError(f"functions alone do not tell how many unknowns body {body} has: needed unknowns")
         rows[body] = int(next(iter(known)))

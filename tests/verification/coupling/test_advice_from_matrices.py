@@ -218,7 +218,7 @@ def test_a_transfer_joins_operators_as_it_joins_matrices():
     S1, S2, P = spd(random, 15), spd(random, 12), random.standard_normal((5, 4))
     expected = vf.advise_matrices(S1, S2, transfer=P)
     for T in (P, sp.csr_array(P), aslinearoperator(P), aslinearoperator(np.kron(np.eye(3), P))):
-        found = vf.advise_matrices(S1.__matmul__, S2, transfer=T, unknowns=15)
+        found = vf.advise_matrices(S1.__matmul__, S2, transfer=T, unknowns=np.int64(15))
         assert rho(found, 2) == pytest.approx(rho(expected, 2), rel=1e-9)
         assert "its own transfer" in by_body(found)[1].reason["rho"]
 
