@@ -286,8 +286,10 @@ def _faces(read: Any, faces: Faces) -> Iterator[tuple[str, Ints]]:
         for kinds in {name.upper(): sets.get(name.upper(), {}) for name in (f"{HIDDEN}{i}", *listed)}.values():
             for kind, members in kinds.items():
                 corners, first = 3 if kind.startswith("triangle") else 4, int(face) if face.isdecimal() else 0
+                if first > corners and kind not in PIECES:
+                    raise NotRead(f"its surface {surface[:SAID]} names face {first} of an element with {corners}")
                 path = [first - 1, *[corners + first - 1] * (kind in ("triangle6", "quad8")), first % corners]
-                for pair in PIECES.get(kind) or pairwise(path if 0 < first <= corners else ()):
+                for pair in PIECES.get(kind) or pairwise(path if first else ()):
                     yield surface, read.cells_dict[kind][members][:, list(pair)]
 
 

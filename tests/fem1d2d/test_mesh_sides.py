@@ -82,7 +82,6 @@ def test_a_surface_by_faces_and_a_set_of_nodes_are_sides(tmp_path, name, halved,
     [
         "*SURFACE, TYPE=NODE, NAME=top\nBlock\n",
         "*SURFACE, NAME=top\nBlock, SPOS\n",  # a face of the plate
-        "*SURFACE, NAME=top\n9, S4\n",  # a triangle has three
         "*NSET, NSET=top\n1\n",
     ],
 )
@@ -101,6 +100,7 @@ def test_what_has_no_edge_is_no_side(tmp_path, words):
         ("Block, S3\nBlok, S3", "surface top lists Blok, which is no element set"),
         ("-1, S3", "surface top lists -1, which is no element set"),
         ("1, S3\n8, S3", "surface top lists an element that it does not have"),
+        ("Block, S3\n9, S4", "surface top names face 4 of an element with 3"),
     ],
 )
 def test_a_surface_that_lists_what_the_file_lacks_is_refused_and_loses_no_edge(tmp_path, lists, why):

@@ -58,7 +58,6 @@ PRESSURE_ERRORS = {
     "mesh": ((8.3, 13.0), (0.3, 0.3), "on quadrilaterals"),
 }
 
-
 #: The smaller extent of a body over the larger one, at least: places within 1e-9 of the larger one count as the same.
 SLENDEREST = 1e-7
 
