@@ -103,6 +103,8 @@ def remedy_of(
 
 
 def _rho(pair: ContactPair) -> float:
+    if pair.neumann.rigid:
+        return 0.0  # as it does not move
     rho = measure(pair).rho_max
     assert rho is not None  # a pair has interface matrices
     return rho.value

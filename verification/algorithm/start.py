@@ -84,7 +84,7 @@ def iterate(
     >>> [round(float(step.g[0]), 4) for step in islice(iterate(bars, theta="1/2"), 3)]
     [0.0, 0.1, 0.05]
     """
-    pair = pair_of(problem)
+    pair = pair_of(problem, obstacle=True)
     relaxation, T = rule_of(rule or pair.settings.relaxation), FixedPointMap(pair, solver)
     choice, begun = choose(pair, theta, rule=relaxation), begin_at(T, start)
     return iterates(T, relaxation.begin(pair, float(choice.theta), choice.rho), begun.g, begun.scale)

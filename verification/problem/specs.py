@@ -166,11 +166,12 @@ class Arc(Entries):
     def points(self) -> list[tuple[float, float]]:
         """Points on it, from one end to the other; a whole circle ends where it begins."""
         low, high = map(float, self.arc)
-        count = max(8, math.ceil(ON_CIRCLE * min(high - low, 360.0) / 360))
-        turns = [math.radians(low + (high - low) * i / count) for i in range(count + 1)]
+        turn = min(high - low, 360.0)
+        count = max(8, math.ceil(ON_CIRCLE * turn / 360))
+        turns = [math.radians(low + turn * i / count) for i in range(count + 1)]
         x, y = map(float, self.centre)
         found = [(x + float(self.radius) * math.cos(a), y + float(self.radius) * math.sin(a)) for a in turns]
-        return [*found[:-1], found[0]] if high - low >= 360 else found
+        return [*found[:-1], found[0]] if turn == 360 else found
 
 
 _elastic = lambda at: at["shape"] != "rigid"

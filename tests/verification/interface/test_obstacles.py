@@ -34,6 +34,7 @@ def test_a_wheel_on_a_block_has_the_pressure_of_hertz():
 
 @pytest.mark.parametrize("face", [
     {"circle": {"centre": [0, 3], "radius": 3}},
+    {"circle": {"centre": [0, 3], "radius": 3, "arc": [270, 670]}},
     {"line": [[3 * np.sin(a), 3 - 3 * np.cos(a)] for a in np.linspace(-0.5, 0.5, 41)]},
     {"line": [[3 * np.sin(a), 3 - 3 * np.cos(a)] for a in np.linspace(0.5, -0.5, 41)]},
 ])  # fmt: skip
@@ -140,6 +141,15 @@ def test_what_has_no_meaning_for_an_obstacle_is_refused():
         with pytest.raises(vf.ProblemError, match=r"body2\.shape = \"rigid\": needed an elastic body"):
             ask(run.pair)
     assert vf.run(run.pair).iterations == run.iterations
+
+
+def test_a_run_against_an_obstacle_that_does_not_converge_names_a_theta_with_which_it_does():
+    problem = pressed({"circle": WHEEL}, BLOCK | {"cells": [8, 4]}, friction="0.2", radius="0.5")
+    problem = problem.changed(theta="1e-6", max_iterations=5)
+    run = vf.run(problem)
+    assert (run.outcome, run.remedy.key, run.remedy.exchanged) == ("limit", "iteration.theta", None)
+    assert vf.run(problem.changed(theta=run.remedy.value, max_iterations=50)).converged
+    assert [next(vf.iterate(given)).residual for given in (problem, run.pair)] == [run.iterates[0].residual] * 2
 
 
 REFUSED = {
