@@ -90,7 +90,7 @@ def _bodies_of_several(top: TomlTable, around: Mapping[str, Any]) -> dict[int, B
     """Read any number of elastic bodies."""
     if around["dimension"] == 1:
         raise top.refuse("contact", None, "needed one table [contact]: in one dimension there are two bodies")
-    numbers = sorted({1, 2} | {int(name[4:]) for name in top.names() if re.fullmatch("body[1-9][0-9]*", str(name))})
+    numbers = sorted({1, 2} | {int(name[4:]) for name in top.names() if re.fullmatch("body[1-9][0-9]{0,8}", str(name))})
     bodies = {i: _read_body(top.table(f"body{i}", required=True), around) for i in numbers}
     for i, body in bodies.items():
         if body.rigid:

@@ -98,7 +98,7 @@ def _begun(origin: Origin) -> SharedBodies | str:
 
 def unusable(start: Problem | ContactPair) -> str:
     """Return why a mesh file of a problem cannot be used here, whatever the row; empty where all can."""
-    bodies = (start.body1, start.body2) if isinstance(start, Problem) else ()
+    bodies = start.bodies.values() if isinstance(start, Problem) else ()
     return "; ".join(f"{body.mesh.path}: {why}" for body in bodies if body.mesh and (why := body.mesh.unusable()))
 
 

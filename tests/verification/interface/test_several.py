@@ -282,6 +282,7 @@ def test_bodies_that_move_together_are_refused():
         ({"body3": {"shape": "rigid"}}, "body3.shape", "one that is fixed and stiff replaces an obstacle"),
         ({"body3": plate((2, 3), "1e-28")}, "body3.young", "within 1e+08"),
         ({"body4": plate((3, 4))}, "body4", "needed a table [[contact]]"),
+        ({"body" + "9" * 5000: plate((3, 4))}, "body" + "9" * 5000, "unknown table"),
         ({"step": [{"body4": {}}]}, "step[1].body4", "known here: name, increments, body1, body2, body3"),
         ({"iteration": {"neumann_body": 2}}, "iteration.neumann_body", "needed neumann_bodies, a list"),
         ({"iteration": {"neumann_bodies": [1, 2]}}, "iteration.neumann_bodies", "not both of 1 and 2"),
@@ -416,3 +417,14 @@ def test_a_stack_of_three_without_friction_has_the_pressure_of_springs_in_series
     exact = 0.01 / sum((high - low) * (1 - nu**2) / E for low, high, E, nu, _ in sizes.values())
     assert vf.solve(problem).contact.pressure == pytest.approx(exact, rel=1e-10)
     assert vf.run(problem).contact.pressure == pytest.approx(exact, rel=1e-7)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_sweep_whose_mesh_file_is_gone_is_refused_before_any_row(tmp_path, jobs):
+    data, mesh = stack(), rectangle((0.0, 4.0), (1.0, 2.0), (8, 2))
+    write_gmsh22(tmp_path / "body2.msh", mesh.points, mesh.cells, mesh.sides)
+    data["body2"] = {"mesh": str(tmp_path / "body2.msh"), "young": "7e4", "poisson": "0.3"}
+    problem = read(data)
+    (tmp_path / "body2.msh").unlink()
+    with pytest.raises(vf.ProblemError, match=r"body2\.msh: no such file"):
+        vf.sweep(problem, theta=["0.3", "0.4"], jobs=jobs, store=tmp_path / "rows.sqlite")
