@@ -92,7 +92,7 @@ class Nonlocal(Law):
         even = (self.operator(interface) @ pressed)[closed]
         length, inside = float(weights.sum()), pressed > 0
         share = float(weights[closed] @ even) / length
-        r, width = self.radius, float(np.diff(interface.neumann.x)[inside[1:] | inside[:-1]].max())
+        r, width = self.radius, float(np.diff(interface.neumann.x)[inside[1:] | inside[:-1]].max(initial=0.0))
         if r < width * (1 - 1e-9):
             effect = f"multiplies friction by about width/radius = {width / r:.3g}"
             if not interface.one_grid:

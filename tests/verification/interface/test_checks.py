@@ -203,3 +203,5 @@ def test_of_the_kernel_the_part_that_is_closed_is_looked_at():
     assert said(np.ones(7)) == []
     (few,) = said(np.array([0.0, 0, 1, 1, 0, 0, 0]))
     assert "contact.radius = 0.15 is not small against the length 0.2 of the closed part of Gamma_c" in few
+    one = vf.build(S1=np.eye(2), S2=np.eye(2), load2=np.array([0.0, -1]), x=np.zeros(1), law=Nonlocal(radius=1.0))
+    assert vf.run(one.at(friction=0.2)).warnings == []  # of one node nothing can be said
