@@ -158,12 +158,14 @@ class ActiveSet:
 
     def repeated(self, q: Floats, bound: Floats, start: Pattern) -> Iterator[tuple[Floats, Floats, Pattern]]:
         """Yield the guesses that come again and again where the pattern does not settle; none where it does."""
-        seen: set[bytes] = set()
-        for v, force, pattern, agrees in islice(self._guesses(q, bound, start), self._limit, 2 * self._limit):
-            if agrees or pattern.key in seen:
+        seen: list[bytes] = []
+        for v, force, pattern, agrees in islice(self._guesses(q, bound, start), 2 * self._limit):
+            times = seen.count(pattern.key)
+            if agrees or times > 1:
                 return
-            seen.add(pattern.key)
-            yield v, force, pattern
+            seen.append(pattern.key)
+            if times:
+                yield v, force, pattern
 
     def _guesses(
         self, q: Floats, bound: Floats, pattern: Pattern, hint: Pattern | None = None
