@@ -62,8 +62,8 @@ class Document(Value, keys.Part, ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the document as plain dictionaries, lists and numbers."""
-        problem, several = self.problem, self.problem is not None and self.problem.several
-        colours = [list(problem.numbers(body)) for body in (1, 2)] if problem is not None and several else None
+        problem = self.problem
+        colours = [list(problem.numbers(body)) for body in (1, 2)] if problem is not None and problem.several else None
         head = Header(schema=self.schema, units=dict(self.units), colours=colours).to_dict()
         origin = {} if problem is None else {"problem": problem.to_dict()}
         kind = {"kind": self.kind} if type(self).kind else {}

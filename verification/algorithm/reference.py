@@ -26,8 +26,8 @@ MOST_STEPS, MOST_PAIRS = 50, 350_000
 class Reference(Part):
     """A run by cvxpy's own answers beside the run it refers to.
 
-    The difference is relative to the largest ``|||T g|||`` so far.  ``why`` says why the run was not repeated, or shows
-    no rate.
+    The difference is relative to the ``scale`` of the iterate.  ``why`` says why the run was not repeated, or shows no
+    rate.
     """
 
     steps: int = key("how many evaluations of T were repeated")

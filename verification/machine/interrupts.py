@@ -20,7 +20,6 @@ INTERRUPTED = "interrupted before it was worked out"
 #: Seconds without an answer after which a second Ctrl-C is one: some programs that start others pass each one on twice.
 UNANSWERED = 0.3
 
-
 #: True if a signal can be held back; not on Windows.
 CAN_WAIT = hasattr(signal, "pthread_sigmask")
 

@@ -92,10 +92,7 @@ def _numbers(loads: All) -> list[Fraction]:
     vectors = [
         vector
         for each in loads.values()
-        for vector in (
-            *(*each.prescribed.values(), *each.traction.values(), *each.point_load.values()),
-            each.body_force,
-        )
+        for vector in (*each.prescribed.values(), *each.traction.values(), *each.point_load.values(), each.body_force)
     ]
     return [v for vector in vectors for v in vector if v is not None]
 

@@ -43,7 +43,6 @@ FIRST_ESTIMATE = 2.0
 #: 0.05 to 0.95.
 THETAS = tuple(f"{n / 20:.2f}" for n in range(1, 20))
 
-
 #: The keys of a zone.
 ZONE = {
     "state": Key(says="`stick`, `slip` or `open`", type="text"),

@@ -65,7 +65,7 @@ def _says(outcome: Outcome) -> str:
         return ", ".join(f"{state} to {high:.2f}" for state, _, high in zones(outcome.contact))
     found = []
     for curve in outcome.curves:
-        at = curve.steps.get(0.6)
+        at = curve.steps_at_printed
         best = "none converges" if not curve.best else f"{curve.best[0]:g}: {curve.fewest}"
         found.append(f"{best} (0.6: {'-' if at is None else at})")
     return "best theta: steps " + "; ".join(found)

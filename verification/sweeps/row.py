@@ -64,7 +64,7 @@ _number = partial(Key, type="number")
 _whole = partial(Key, type="integer")
 _text = partial(Key, type="text")
 REFUSED_MATRICES = "where the row was refused and the pair comes from matrices"
-NO_MODULUS = "of a rigid body, and of a pair made from matrices"
+NO_MODULUS = "of a rigid body, of one with several materials, and of a pair made from matrices"
 
 #: The columns of a row: first the values of the grid, then the results.  A meaning begins with the column's full name.
 COLUMNS = {

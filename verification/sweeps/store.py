@@ -46,7 +46,7 @@ SOLVER = "auto"
 
 #: Raised by every change of a digit of a row, and only by these: 2 since a residual is compared with present forces, 3
 #: since a node that is held tangentially has no friction, and the normal between two lines is the mean of both, 4 since
-#: steps on one affine piece are taken together again.
+#: steps on one affine piece are taken together again, 5 since large interface matrices are condensed in another order.
 NUMERICS = 5
 
 #: Settings and arrays (name in the key: attribute) that always enter the key of a pair; a later setting enters where it

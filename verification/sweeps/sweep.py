@@ -156,7 +156,7 @@ def sweep(
     radius : list of number, optional
         Radius of the kernel of S, length.
     rule : list of Rule or str, optional
-        Relaxation rules, or their names: 'constant', 'aitken', 'anderson', 'newton', 'momentum'.
+        Relaxation rules, or their names as a problem file has them.
     jobs : int
         Processes; 0 or less counts back from all cores, -1 is all.
     store : path, optional
