@@ -221,5 +221,5 @@ def _side(arrays: dict[str, np.ndarray], i: int, grid: Grid) -> Condensed:
         load=real_array(f"load{i}", arrays[f"load{i}"], size),
         known=real_array(f"known{i}", arrays.get(f"known{i}", np.zeros(size)), size),
         free=free,
-        motions=motions,
+        motions=motions if motions.size else NO_MOTIONS,
     )

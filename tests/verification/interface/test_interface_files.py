@@ -131,6 +131,11 @@ def test_what_is_no_interface_file_is_refused(tmp_path, content):
         vf.build(path)
 
 
+def test_an_interface_file_with_no_motions_of_any_shape_has_none(arrays, tmp_path):
+    np.savez(tmp_path / "empty.npz", **arrays | {"motions1": np.empty(0)})
+    assert vf.run(tmp_path / "empty.npz").converged
+
+
 def test_an_interface_file_that_would_fill_the_memory_is_refused_by_its_headers(arrays, tmp_path):
     bomb = tmp_path / "bomb.npz"
     np.savez(bomb, **arrays)
