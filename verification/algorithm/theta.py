@@ -106,14 +106,8 @@ def automatic(energy: EnergyBounds, outside: Sequence[str] = (), tolerance: floa
     """
     rho = energy.rho.value
     predicted = below_one(energy.theta_predicted)
-    nothing = (
-        outside[0]
-        if outside
-        else "the energy bound is 1 or more for every theta"
-        if energy.theta_proved is None
-        else None
-    )
-    if nothing is not None or energy.theta_proved is None:
+    if outside or energy.theta_proved is None:
+        nothing = outside[0] if outside else "the energy bound is 1 or more for every theta"
         return Choice(theta=predicted, source="predicted", rho=rho, why=f"no theta is proved: {nothing}")
     proved = below_one(energy.theta_proved)
     of_proved, of_predicted = (predicted_steps(theta, rho, tolerance) for theta in (proved, predicted))

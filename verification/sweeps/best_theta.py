@@ -48,8 +48,8 @@ MOST = 12
 class Fewest:
     """The thetas of fewest steps among those that were run.
 
-    From ``low`` to ``high`` they took so many ``steps``; ``below`` and ``above`` are the next thetas that were run,
-    which took more steps or did not arrive; None where there are none: fewer steps may lie beyond.
+    ``low`` and ``high``, the least and the largest of them, took so many ``steps``; ``below`` and ``above`` are the
+    next thetas beyond, which took more or did not arrive; None where none was run: fewer steps may lie beyond.
     """
 
     steps: int
