@@ -111,18 +111,16 @@ def build(
         raise ValueError(f"neumann_body {neumann_body!r}: needed 1 or 2")
     if kernel is not None and law is not None:
         raise ValueError("received a kernel and a law: needed one of them")
-    contact_name, neumann_name = ("S1", "S2") if neumann_body == 2 else ("S2", "S1")
     S1, S2 = (real_array(name, S, (None, None), "a square matrix") for name, S in (("S1", S1), ("S2", S2)))
     for name, matrix in (("S1", S1), ("S2", S2)):
         check_unit(name, matrix)
-        if name == neumann_name:
+        if name == f"S{neumann_body}":
             check_matrix(name, matrix)
-    lower, upper = (S1, load1), (S2, load2)
-    (S_c, l_c), (S_n, l_n) = (lower, upper) if neumann_body == 2 else (upper, lower)
-    motions = stiffness(contact_name, S_c).motions
-    for name, matrix in (("S1", S1), ("S2", S2)):
         if len(matrix) % 2:
             raise ValueError(f"{name} is {size(matrix)}: needed two components at each contact node")
+    lower, upper = (S1, load1), (S2, load2)
+    (S_c, l_c), (S_n, l_n) = (lower, upper) if neumann_body == 2 else (upper, lower)
+    motions = stiffness(f"S{3 - neumann_body}", S_c).motions
     n, m = len(S_c) // 2, len(S_n) // 2
     if transfer is None and n != m:
         raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed the same contact nodes, or a transfer")

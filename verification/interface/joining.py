@@ -31,6 +31,9 @@ MOST_OVERLAP = 0.05
 #: The part of an edge within which an end of the interval means a node: coordinates are printed with six digits.
 SNAP = 1e-3
 
+#: The largest radius of a kernel between two planes of symmetry, in lengths of Gamma_c: it has an image in each length.
+FARTHEST = 1000
+
 #: Body 1 lies below, body 2 above.
 UPPER = (True, False)
 
@@ -81,9 +84,13 @@ def join(
     support = _supported(known, nodes)[:: 1 if problem.contact_body == 1 else -1]
     interface = Interface.joining(contact, neumann, P, support, gap=gap, law=law, profile=problem.contact.profile)
     check_profile(problem, interface)
-    if P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
+    radius, needed = problem.contact.radius, ""
+    if radius and radius > FARTHEST * contact.s[-1] and interface.planes[0].sum() > 1:
+        needed = f"needed at most {FARTHEST} times the length of Gamma_c between two planes of symmetry"
+    elif P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
         needed = "needed a larger one: it reaches no node of the Neumann grid from any contact node, so that S is 0"
-        raise problem.refuse("contact.radius", problem.contact.radius, needed)
+    if needed:
+        raise problem.refuse("contact.radius", radius, needed)
     return nodes, interface
 
 

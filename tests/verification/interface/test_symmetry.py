@@ -247,6 +247,8 @@ def test_between_two_planes_of_symmetry_the_kernel_is_that_of_the_periodic_model
     stress = pair.interface.stress(np.concatenate([np.zeros(9), pair.contact.grid.weights]))
     assert stress == pytest.approx(np.ones(9), rel=1e-12)
     assert vf.run(pair, theta="0.2").converged
+    with pytest.raises(vf.ProblemError, match=r"contact\.radius = 5000: needed at most 1000 times the length"):
+        pair.changed(radius=5000)  # one image for each length
 
 
 def test_a_support_of_the_contact_body_alone_carries_the_shear_there_and_the_slip_past_it_is_shown():
