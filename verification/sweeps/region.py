@@ -83,6 +83,8 @@ def chart(
     ------
     ProblemError
         A problem outside the theorem, or without a law of friction; a store that cannot be used.
+    ContactError
+        A run has no certificate of step II.
     KeyboardInterrupt
         Before the first region was traced; later it leaves out what was still to come.
     """
