@@ -64,7 +64,7 @@ class Mesh(Cells):
         The named surfaces of a file of which it takes a group, by names such as ``wing of both.msh``: True if it has
         cells of them.
     off : mapping from name to str
-        Named lines of a file that are no edges of the boundary, and no sides: where they are, in words.
+        Where, in words, the named lines of a file are that are neither edges of the boundary nor sides.
     centres : int array, shape (q,)
         Nodes in the middle of quadrilaterals that were split by both diagonals.
 

@@ -1,7 +1,7 @@
 """Tables that lower modules look into and upper modules fill: laws, rules, bounds, forms of logs,
 what shows a result.
 
-An entry may be added at any time: whoever loops over a table reads it then.  Entries have the types that their own
+An entry may be added at any time: a loop over the table finds it.  Entries have the types that their own
 modules check.
 """
 

@@ -306,7 +306,7 @@ def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[Iterate], N
     yield watch
 
 
-#: Seconds between two lines about progress, in a log and on an stderr that is no terminal.
+#: Seconds between two lines about progress, in a log and on an stderr that is not a terminal.
 IN_LOG, ON_STDERR = 10, 60
 
 #: The key of the problem in the context of a command.

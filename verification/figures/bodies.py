@@ -52,7 +52,7 @@ def draw_bodies(result: Run | Solution, *, stress: str = "", motions: bool = Fal
     motions : bool
         Whether a further panel has gap and slip along Gamma_c.
     zoom : bool
-        Whether only the part where the bodies touch is drawn; all of Gamma_c where they touch nowhere.
+        True to draw only the part where the bodies touch, or all of Gamma_c if they do not touch.
     """
     if stress not in ("", *STRESSES):
         raise ValueError(f"stress {stress!r}: needed one of {', '.join(STRESSES)}")

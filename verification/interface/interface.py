@@ -364,7 +364,7 @@ class Interface(Value):
     def reflected(self, x: Floats, reach: float) -> list[Floats]:
         """Return the images of positions in the planes of symmetry that come within a distance of Gamma_c.
 
-        Between two planes the images are reflected in turn.
+        Between two planes each image is reflected in the other plane.
         """
         at = list(self.contact.x[self.planes[0]])
         low, high = self.contact.x[0] - reach, self.contact.x[-1] + reach
