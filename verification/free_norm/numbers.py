@@ -62,10 +62,12 @@ def with_friction(by: M, k: Fraction) -> M:
 def proved(value: float, side: int, holds: Callable[[Fraction], bool], margins: Sequence[float] = MARGINS) -> Number:
     """The nearest of some numbers beside one, above it (side 1) or below it (-1), for which something is proved.
 
-    The number in doubles where it is proved for none.
+    Above a number below 1 it stays there.  The number in doubles where it is proved for none.
     """
     for margin in (0.0, *margins) if value == 1 else margins:  # theta = 1 itself may be proved
         moved = Fraction(value * (1 + side * margin))
+        if value < 1 <= moved:
+            moved = (1 + Fraction(value)) / 2
         if holds(moved):
             end = above(moved) if side > 0 else below(moved)
             return Number(value=end, **{"hi" if side > 0 else "lo": end}, level="guaranteed")

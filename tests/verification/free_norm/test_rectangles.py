@@ -134,6 +134,12 @@ def test_with_the_roles_exchanged_small_thetas_are_proved_and_none_in_numbers(ex
     assert "no room for a cut-off" in found.reason["factor"]
 
 
+def test_at_a_small_theta_no_factor_above_1_is_called_a_proof_of_contraction(own):
+    """Beyond the energy norms; a share of the factor itself would lead above 1."""
+    factor = rectangle_norm(MODEL, own, F("0.5"), F("0.0001")).factor
+    assert factor is None or 1 - 1e-4 < factor.hi < 1
+
+
 def test_without_friction_every_number_has_its_reason(own):
     found = rectangle_norm(MODEL, own, F(0), F("0.7")).to_dict()
     assert {value for name, value in found.items() if name != "reason"} == {None}
