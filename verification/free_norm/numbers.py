@@ -46,7 +46,7 @@ def numbers(search: Search, k: Fraction, theta: Fraction | None, found: Found) -
         known["theta_max"] = found(largest, -1, lambda value: holds(disk(value, Fraction(1))))
         best, least = search.best_theta(float(k), largest)
         known |= {"theta_best": best, "factor_best": factor(Fraction(best), least)}
-        theta = Fraction(best).limit_denominator(10**4) if theta is None else theta
+        theta = Fraction(str(best)) if theta is None else theta
     if theta is not None and (q := search.factor(float(theta), float(k))) is not None:
         known["factor"] = factor(theta, q)
     known["friction_threshold"] = found(search.friction_threshold, -1, lambda value: holds(SMALL_THETAS, value))

@@ -58,11 +58,6 @@ class RectangleSearch(Search):
             best = found
         return best
 
-    def best_theta(self, k: float, largest: float) -> tuple[float, float]:
-        """The same to three digits, as it is shown."""
-        theta = min(float(f"{super().best_theta(k, largest)[0]:.3g}"), largest)
-        return theta, self.factor(theta, k) or 1.0
-
     def with_share(self, ends: tuple[float, float], mu: float) -> Allowed:
         """The same for one mu."""
         unit = 1 / self.circle.C_t1_square
@@ -77,7 +72,8 @@ class RectangleSearch(Search):
             return self.alpha_by(ends, one), one.beta
 
         found = drawn_in(at, (-1.0, 0.0), WIDTHS, GRID if ends[0] else (GRID[0], 1), LIMITS)
-        one, alpha = by(*found), float(self.alpha_by(ends, by(*found)))
+        one = by(*found)
+        alpha = float(self.alpha_by(ends, one))
         best = replace(one, alpha=alpha, beta=float(one.beta), nu=float(one.nu))
         return Allowed(float(np.sqrt(4 * alpha * best.beta)) if alpha > 0 else -1.0, best)
 

@@ -114,7 +114,8 @@ class Search:
     def factor(self, theta: float, k: float) -> float | None:
         """The least q for which T_theta contracts by q at friction k, 0 < theta <= 1; None where there is none."""
         missing = lambda q: self.allowed(disk(theta, q)).friction - k
-        return _least(missing, 1 - theta + NEAR, 1.0)
+        near = min(NEAR, theta / 1000)
+        return _least(missing, 1 - theta + near, 1.0, near)
 
     def largest_theta(self, k: float) -> float | None:
         """The theta <= 1 below which every T_theta contracts at friction k; None where no theta does."""
@@ -123,10 +124,11 @@ class Search:
         return None if share is None else 1 - share
 
     def best_theta(self, k: float, largest: float) -> tuple[float, float]:
-        """The theta <= ``largest`` with the least factor at friction k, to 0.005, and that factor."""
-        factor = lambda theta: self.factor(theta, k) or 1.0
-        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": 5e-3})
-        return float(found.x), float(found.fun)
+        """The theta <= ``largest`` with the least factor at friction k, to 0.005 in three digits, and that factor."""
+        factor, near = lambda theta: self.factor(theta, k) or 1.0, min(5e-3, largest / 10)
+        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": near})
+        theta = min(float(f"{found.x:.3g}"), largest)
+        return theta, factor(theta)
 
     def energy_factor(self, theta: float, k: float) -> tuple[float, Multipliers, float]:
         """The least factor in the norm (5.21) by multipliers that all wave numbers share; these, and their weight.
@@ -261,14 +263,14 @@ def least_ratio(over: tuple[Any, Any, Any], under: tuple[Any, Any, Any]) -> Floa
     return best
 
 
-def _least(missing: Callable[[float], float], low: float, high: float) -> float | None:
+def _least(missing: Callable[[float], float], low: float, high: float, near: float = NEAR) -> float | None:
     """The least value from which on something that grows is >= 0, on the safe side; None where it is nowhere."""
     missing = cache(missing)  # the search for a zero begins and ends where it was asked already
     if missing(high) < 0:
         return None
     if missing(low) >= 0:
         return low
-    found = brentq(missing, low, high, xtol=NEAR)
+    found = brentq(missing, low, high, xtol=near)
     while missing(found) < 0:
-        found = min(found + NEAR, high)
+        found = min(found + near, high)
     return float(found)

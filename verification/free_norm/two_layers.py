@@ -159,7 +159,7 @@ def _role(number: int, search: Search, k: Fraction, theta: Fraction | None, veri
     found: Found = proved if verified else lambda value, side, holds: Number.of_float(value)
     known = numbers(search, k, theta, found)
     if theta is None and "theta_best" in known:
-        theta = Fraction(known["theta_best"]).limit_denominator(10**4)
+        theta = Fraction(str(known["theta_best"]))
     energy = None
     if theta is not None:
         with suppress(LMIError):  # no multipliers at all
