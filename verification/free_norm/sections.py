@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ndtheory import Number
 from verification import registry
+from verification.bounds.bound import rest_of
 from verification.free_norm.two_layers import Layers, LayersRole
-from verification.show.numbers import at_least, at_most, figures
+from verification.show.numbers import at_least, factor, figures
 from verification.show.parts import Cell, Facts, Sections, closing, section, table
 
 CLAIMS = "anything about bodies with ends, of which this is a prediction, or about the local law"
@@ -17,12 +19,15 @@ PROVED = (
 )
 
 
+#: A factor, near 1 as its distance from 1.
+_at_most: Callable[[Number | None], Cell] = lambda number: factor(number, number and rest_of(number))
+
 #: The rows of the table: proved bounds are rounded to the safe side.
 QUANTITIES: dict[str, Callable[[LayersRole], Cell]] = {
-    "factor in the free norm": lambda role: at_most(role.lyapunov.factor),
-    "factor in the norm (5.21)": lambda role: at_most(role.energy.factor),
+    "factor in the free norm": lambda role: _at_most(role.lyapunov.factor),
+    "factor in the norm (5.21)": lambda role: _at_most(role.energy.factor),
     "best theta": lambda role: figures(role.lyapunov.theta_best),
-    "factor there": lambda role: at_most(role.lyapunov.factor_best),
+    "factor there": lambda role: _at_most(role.lyapunov.factor_best),
     "every theta contracts below": lambda role: at_least(role.lyapunov.theta_max),
     "friction: small theta contracts below": lambda role: at_least(role.lyapunov.friction_threshold),
 }
@@ -51,8 +56,8 @@ def _contracts(role: LayersRole) -> str:
     if role.theta is None:
         return f"Neumann body {role.neumann}: no theta is found to contract at this friction."
     free, energy = role.lyapunov.factor, role.energy.factor
-    inside = "no norm is found in which it contracts" if free is None else f"a step contracts by {at_most(free)}"
+    inside = "no norm is found in which it contracts" if free is None else f"a step contracts by {_at_most(free)}"
     plain = "the search finds no factor"
     if energy is not None:
-        plain = f"the factor is {at_most(energy)}{', no contraction' * (energy.value >= 1)}"
+        plain = f"the factor is {_at_most(energy)}{', no contraction' * (energy.value >= 1)}"
     return f"Neumann body {role.neumann}, theta = {role.theta:g}: {inside}; in the norm (5.21) {plain}."

@@ -121,7 +121,7 @@ def interval(ends: tuple[float, float] | None, level: Level) -> Cell:
 
 
 def factor(value: Number | None, one_minus: Number | None) -> Cell:
-    """A contraction factor; near 1 as its distance from 1.
+    """A factor; near 1 and below as its distance from 1.
 
     >>> print(factor(Number.of_float(1 - 2e-11), Number.of_float(2e-11)))
     1 - 2.0e-11
@@ -130,7 +130,7 @@ def factor(value: Number | None, one_minus: Number | None) -> Cell:
     """
     if value is None or one_minus is None:
         return NONE
-    if not one_minus.value < 1e-3:
+    if not 0 < one_minus.value < 1e-3:
         return at_most(value)
     if one_minus.lo is None:
         return Quantity(value.value, f"1 - {one_minus.value:.1e}")

@@ -13,8 +13,10 @@ from ndtheory import HypothesisError
 from ndtheory.continuum.circle import Multipliers, TwoLayers, disk, pencil
 from ndtheory.continuum.strip import Strip
 from ndtheory.moduli import Moduli
+from verification.free_norm.numbers import proved
 from verification.free_norm.search import Search, least_ratio
 from verification.free_norm.two_layers import two_layers
+from verification.show import layout
 
 SECTION_6 = {"young": (70000, 20000), "poisson": ("0.3", "0.3"), "depth": ("0.3", "0.3"), "radius": "0.1"}
 
@@ -102,8 +104,8 @@ def test_the_least_ratio_of_quadratics_is_that_on_a_fine_grid():
 
 @pytest.mark.skipif(not AT_NIGHT, reason="half a minute: by night")
 def test_what_is_proved_is_on_the_safe_side_and_near():
-    proved, found = (two_layers(**SECTION_6, friction="0.2", theta="0.7", verified=v) for v in (True, False))
-    for one, other in zip(proved.roles, found.roles, strict=True):
+    verified, found = (two_layers(**SECTION_6, friction="0.2", theta="0.7", verified=v) for v in (True, False))
+    for one, other in zip(verified.roles, found.roles, strict=True):
         numbers = lambda role: (role.energy.factor, *vars(role.lyapunov).values())
         for sure, seen in zip(numbers(one), numbers(other), strict=True):
             if sure is None or isinstance(sure, float):
@@ -113,7 +115,7 @@ def test_what_is_proved_is_on_the_safe_side_and_near():
             assert sure.value == pytest.approx(seen.value, rel=2e-2)
             assert sure.hi is None or sure.hi >= seen.value
             assert sure.lo is None or sure.lo <= seen.value
-    assert proved.roles[0].lyapunov.factor.hi == pytest.approx(0.3474, abs=1e-3)
+    assert verified.roles[0].lyapunov.factor.hi == pytest.approx(0.3474, abs=1e-3)
 
 
 def test_units_of_length_and_stress_do_not_matter():
@@ -139,6 +141,29 @@ def test_units_of_length_and_stress_do_not_matter():
 def test_bad_values_are_refused_with_what_is_needed(changed, words):
     with pytest.raises(HypothesisError, match=words):
         two_layers(**{**SECTION_6, "friction": "0.2", **changed})
+
+
+@pytest.mark.parametrize("theta", [1e-3, 1e-6, 1e-9])
+def test_a_small_theta_has_a_factor_between_1_minus_theta_and_1(theta):
+    factor = search().factor(theta, 0.2)
+    assert 1 - theta < factor < 1
+    assert (1 - factor) / theta == pytest.approx((1 - search().factor(1e-2, 0.2)) / 1e-2, rel=0.05)
+
+
+def test_a_contact_body_of_any_stiffness_has_a_best_theta():
+    """It is as small as the ratio of the moduli, and so is what a step gains."""
+    role = two_layers(**{**SECTION_6, "young": (1, 30000)}, friction="0.2").roles[0]
+    assert 0 < role.theta == role.lyapunov.theta_best < role.lyapunov.theta_max.value < 1e-4
+    assert 1 - role.theta < role.lyapunov.factor.value < 1
+    assert role.lyapunov.factor.value == role.lyapunov.factor_best.value
+
+
+def test_a_factor_close_to_1_is_proved_and_shown_below_1():
+    number = proved(0.9999, 1, lambda value: value > 0.9999, margins=(1e-3,))
+    assert 0.9999 < number.hi < 1
+    assert proved(1.2, 1, lambda value: True, margins=(1e-3,)).hi > 1.2  # the norm (5.21) may expand
+    shown = layout.text(two_layers(**SECTION_6, friction="0.2", theta="0.0005").sections())
+    assert "a step contracts by 1 - 4.7e-04" in shown
 
 
 def test_beyond_the_threshold_nothing_is_said_to_contract():
