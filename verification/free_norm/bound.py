@@ -83,7 +83,7 @@ class FreeNormBound(Bound):
             detail, norm = _work_out(pair, measured, chosen, progress)
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
-        on = "k" if detail.friction_threshold is not None or measured.C_t1 is None else "any"
+        on = "any" if measured.friction_threshold is None and measured.C_t1 is not None else "k"
         largest = detail.theta_max
         return BoundResult(
             name=self.name,
@@ -172,12 +172,13 @@ def _work_out(
     progress("free norm: best theta", None)
     best = None if largest is None else free.best_theta(largest.theta)
     allowed = _friction(pair, measured, progress)
-    number: dict[str, Any] = {
-        "factor": None if proof is None else Number.of_float(proof.factor),
-        "factor_best": None if best is None else Number.of_float(best.factor),
-        "theta_max": None if largest is None else Number.of_float(largest.theta),
-        "friction_threshold": None if allowed is None else Number.of_float(allowed[0]),
+    found = {
+        "factor": proof and proof.factor,
+        "factor_best": best and best.factor,
+        "theta_max": largest and largest.theta,
+        "friction_threshold": allowed and allowed[0],
     }
+    number: dict[str, Any] = {name: value and Number.of_float(value) for name, value in found.items()}
     unverified: dict[str, str] | None = None
     if measured.unverified is not None:  # proofs were asked for
         exact = None if best is None else Fraction(str(best.theta))

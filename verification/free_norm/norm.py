@@ -133,13 +133,10 @@ class FreeNorm:
 
     def best_theta(self, largest: float) -> Proved | None:
         """The proof for the theta whose factor is least, below the largest one that contracts."""
-
-        def factor(theta: float) -> float:
-            found = self.factor(theta, ROUGH)
-            return 1.0 if found is None else found.factor
-
-        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": THETA})
-        return self.factor(round(float(found.x), 3))
+        factor = lambda theta: 1.0 if (proof := self.factor(theta, ROUGH)) is None else proof.factor
+        near = min(THETA, largest / 10)
+        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": near})
+        return self.factor(float(f"{found.x:.3g}"))
 
     def _inside(
         self, theta: float, border: tuple[float, Circle | None], share: float, at: Callable[[float], Circle | None]
@@ -159,8 +156,7 @@ class FreeNorm:
         Of a factor, or of the least one below 1 by default.
         """
         back = solve_triangular(self.pair.neumann.root, np.eye(len(norm)), lower=True)
-        Q = back.T @ norm @ back
-        Q = symmetric(Q)
+        Q = symmetric(back.T @ norm @ back)
         holds = self.forms.traces.in_norm(Q, multipliers, step=(theta, 1 - theta))
         if factor is None:
             square = self._least_square(theta, norm, multipliers)

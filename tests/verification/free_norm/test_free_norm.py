@@ -3,6 +3,7 @@
 import json
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,9 +15,12 @@ from strategies import AT_NIGHT, contact_problems, fewer, thetas
 import verification as vf
 from ndtheory.continuum.circle import disk
 from verification.algorithm.fixed_point import FixedPointMap
+from verification.bounds.bound import Subject
+from verification.free_norm import bound
 from verification.free_norm.circle import Circles
 from verification.free_norm.norm import NEAR, SMALL, FreeNorm, friction_threshold
 from verification.free_norm.radius import largest_radius
+from verification.registry import BOUNDS
 from verification.semidefinite.multipliers import QuadraticForms
 from verification.semidefinite.pattern_search import largest_factor
 from verification.testing.transforms import problem_in_units, problem_mirrored
@@ -175,3 +179,20 @@ def test_a_form_that_is_not_definite_is_refused_with_its_rounding():
 def test_equal_blocks_with_much_friction_have_no_norm():
     pair = vf.build(vf.Problem.from_dict(blocks(contact={"friction": "8", "radius": "0.3"})))
     assert free(pair).factor(0.3) is None
+
+
+def test_where_no_friction_is_found_none_is_called_allowed(monkeypatch):
+    """The contact body is so stiff that every theta up to SMALL is too large; any friction was shown."""
+    pair = vf.build(vf.example("section6-60"))
+    nothing = bound.FreeNormOfPair(radius=900.0), None
+    monkeypatch.setattr(bound, "_work_out", lambda *given: nothing)
+    found = BOUNDS["lyapunov"].evaluate(Subject.of(pair, vf.measure(pair)), 0.3)
+    assert found.friction.every is None
+    assert found.friction.on == "k"
+
+
+def test_the_best_theta_has_three_digits_however_small(monkeypatch):
+    factor = lambda self, theta, near=NEAR: SimpleNamespace(theta=theta, factor=1 - theta if theta < 3e-4 else theta)
+    monkeypatch.setattr(FreeNorm, "factor", factor)
+    unmade = object.__new__(FreeNorm)
+    assert 2e-4 < unmade.best_theta(1e-3).theta < 1e-3
