@@ -312,5 +312,4 @@ def _condense_tangential(S: Floats, normal: Any, motions: Floats | None = None) 
         return S
     cross = S[np.ix_(slide, normal)]
     inner = Cholesky(S, np.flatnonzero(slide), motions).solve(S[:, normal])[slide]
-    result = S[np.ix_(normal, normal)] - cross.T @ inner
-    return symmetric(result)
+    return symmetric(S[np.ix_(normal, normal)] - cross.T @ inner)

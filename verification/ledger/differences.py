@@ -44,8 +44,7 @@ def lifted_energy(body: Body) -> Floats:
     fields = np.zeros((len(body.positions), len(elastic.interface)))
     fields[elastic.interface] = np.eye(len(elastic.interface))
     fields[elastic.inside] = elastic.lift
-    energy = fields.T @ (body.stiffness @ fields)
-    return symmetric(energy)
+    return symmetric(fields.T @ (body.stiffness @ fields))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -132,8 +132,7 @@ class Conditions:
 
     def conditions(self, multipliers: Weights) -> Floats:
         """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
-        total = weighed(multipliers, self.families)
-        return symmetric(total)
+        return symmetric(weighed(multipliers, self.families))
 
     def inner(self, one: Floats, other: Floats) -> Floats:
         """The inner product of two linear forms in the norm of the factor: (5.21), Euclidean in these coordinates.
@@ -150,8 +149,7 @@ class Conditions:
     @property
     def cross(self) -> Floats:
         """The form ``<g, p>``."""
-        cross = self.inner(self.g, self.p)
-        return symmetric(cross)
+        return symmetric(self.inner(self.g, self.p))
 
     def fixed(self, theta: float) -> Floats:
         """The form ``-|theta p + (1 - theta) g|^2``: what is left of a difference of forces after one step."""

@@ -127,8 +127,7 @@ def top(form: Floats, against: Floats | None = None) -> float:
 
 def square(rows: Floats, gram: Floats) -> Floats:
     """``rows' gram rows``, symmetric to the last digit."""
-    form = rows.T @ gram @ rows
-    return symmetric(form)
+    return symmetric(rows.T @ gram @ rows)
 
 
 def locate(pair: ContactPair, measured: Measured, *, progress: Progress = silent) -> Losses | None:

@@ -76,8 +76,7 @@ def values(factors: tuple[Floats, Floats]) -> Floats:
 
 def form_of(factors: tuple[Floats, Floats]) -> Floats:
     """The matrix of a form from its factors for a basis of forces."""
-    form = factors[0] @ factors[1].T
-    return symmetric(form)
+    return symmetric(factors[0] @ factors[1].T)
 
 
 def answers(piece: Piece, root: Floats | None = None) -> Responses:
