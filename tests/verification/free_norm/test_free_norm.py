@@ -16,11 +16,12 @@ import verification as vf
 from ndtheory.continuum.circle import disk
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.bounds.bound import Subject
-from verification.free_norm import bound
+from verification.free_norm import norm
 from verification.free_norm.circle import Circles
 from verification.free_norm.norm import NEAR, SMALL, FreeNorm, friction_threshold
 from verification.free_norm.radius import largest_radius
 from verification.registry import BOUNDS
+from verification.semidefinite import LMIError
 from verification.semidefinite.multipliers import QuadraticForms
 from verification.semidefinite.pattern_search import largest_factor
 from verification.testing.transforms import problem_in_units, problem_mirrored
@@ -181,11 +182,16 @@ def test_equal_blocks_with_much_friction_have_no_norm():
     assert free(pair).factor(0.3) is None
 
 
+def fails(*given, **options):
+    raise LMIError("no friction is found at which small thetas contract")
+
+
 def test_where_no_friction_is_found_none_is_called_allowed(monkeypatch):
     """The contact body is so stiff that every theta up to SMALL is too large; any friction was shown."""
     pair = vf.build(vf.example("section6-60"))
-    nothing = bound.FreeNormOfPair(radius=900.0), None
-    monkeypatch.setattr(bound, "_work_out", lambda *given: nothing)
+    for name in ("factor", "largest_theta"):
+        monkeypatch.setattr(FreeNorm, name, lambda *given: None)
+    monkeypatch.setattr(norm, "friction_threshold", fails)
     found = BOUNDS["lyapunov"].evaluate(Subject.of(pair, vf.measure(pair)), 0.3)
     assert found.friction.every is None
     assert found.friction.on == "k"
