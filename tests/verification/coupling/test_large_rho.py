@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from strategies import log_uniform
 
 import verification as vf
-from verification.coupling.runs import LARGE
 
 
 def explodes(path, *residuals):
@@ -74,15 +73,14 @@ def test_forty_windows_of_four_iterations_lead_to_the_theta_for_rho(tmp_path):
     assert (with_friction.interval.lo, with_friction.readings) == (None, ())
 
 
-@pytest.mark.parametrize(("ratio", "shown"), [("1.5", False), ("5.5", True)])
-def test_the_methods_are_compared_as_soon_as_every_reading_has_a_large_rho(ratio, shown):
-    found = vf.advise_run("0.5", ratio, tied=True)  # rho is known: 4 and 12
-    assert found.best.rho.value > 0
-    undecided = vf.advise_run("0.1", ratio)  # at least 19 by a level
-    assert (undecided.theta, bool(undecided.methods)) == (None, True)
-    small = vf.advise_run("0.9", ratio)  # a level has 1.2
-    assert (small.methods == ()) == (LARGE > 2 / 0.9 - 1)
-    assert shown == (found.best.rho.value > LARGE)
+@pytest.mark.parametrize("ratio", ["1.5", "5.5"])
+def test_the_methods_are_compared_as_soon_as_every_reading_has_a_large_rho(ratio):
+    for theta, compared in (("0.9", False), ("0.182", False), ("0.181", True), ("0.1", True)):
+        undecided = vf.advise_run(theta, ratio)
+        least = min(reading.lo for reading in undecided.readings)
+        assert least == pytest.approx(2 / float(theta) - 1, rel=1e-3)  # by the level, whatever the ratio
+        assert (least > 10) == compared
+        assert (undecided.theta, bool(undecided.methods)) == (None, compared)
 
 
 # --- the sentence to quote -------------------------------------------------------------------------------------------
