@@ -216,11 +216,12 @@ def searched(driver, tmp_path):
         "utf-8",
     )
 
+    from selenium.webdriver.support.ui import WebDriverWait
+
     def shown(query: str) -> list[tuple[str, str]]:
         driver.get(f"{(tmp_path / 'search.html').as_uri()}?q={query}")
         done = "return document.querySelector('#search-results h2').innerText === 'Search Results'"
-        while not driver.execute_script(done):
-            pass
+        WebDriverWait(driver, 60).until(lambda page: page.execute_script(done))
         links = "return [...document.querySelectorAll('li')].map(e => [e.querySelector('a').href, e.innerText])"
         found = driver.execute_script(links)
         assert driver.get_log("browser") == []  # from disk no page is fetched for a summary
