@@ -3,11 +3,11 @@
 import importlib.util
 import json
 import math
-import os
 import re
 from pathlib import Path
 
 import pytest
+from strategies import AT_NIGHT
 
 ROOT = Path(__file__).parents[2]
 SOURCE = (ROOT / "docs/paper/paper.typ").read_text(encoding="utf-8")
@@ -43,12 +43,7 @@ def test_numbers_without_a_mesh_have_the_names_that_the_source_reads(compute, kn
     assert found["rho_normal"] == pytest.approx(2 / 7, rel=1e-12)  # E_c / E_n
 
 
-at_night = pytest.mark.skipif(
-    os.environ.get("HYPOTHESIS_PROFILE") != "nightly", reason="in the nightly profile, as it takes half a minute"
-)
-
-
-@at_night
+@pytest.mark.skipif(not AT_NIGHT, reason="in the nightly profile, as it takes half a minute")
 def test_all_numbers_and_figures_are_made(compute, tmp_path):
     compute.write(tmp_path)
     numbers = json.loads((tmp_path / "numbers.json").read_text(encoding="utf-8"))

@@ -352,7 +352,6 @@ def test_screens_name_the_range_and_the_factor_by_which_friction_may_grow():
     assert "contracts for k <" not in advice
 
 
-@pytest.mark.skipif(not strategies.AT_NIGHT, reason="six seconds: by night")
 @pytest.mark.usefixtures("known_continuum")
 @pytest.mark.skipif(not strategies.AT_NIGHT, reason="six seconds: by night")
 def test_the_continuum_takes_the_largest_coefficient():

@@ -1,20 +1,19 @@
 """Contact problems with answers from elsewhere: Hertz, a ramp, a press fit, a flat punch, half a model."""
 
 import json
-import os
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mesh_writer import write_gmsh22
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification.interface.assembly import discretise
 
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 RECORD = json.loads((BENCHMARKS / "records" / "advice" / "gallery.json").read_text("utf-8"))["rows"]
-NIGHT = os.environ.get("HYPOTHESIS_PROFILE") == "nightly"
 
 #: What the coarsest meshes may miss more than the finest ones.
 COARSE = 4
@@ -29,7 +28,7 @@ def gallery(monkeypatch):
 @pytest.mark.parametrize("row", RECORD, ids=lambda row: row["name"])
 def test_a_problem_of_the_gallery_has_the_answer_from_elsewhere(gallery, row, tmp_path):
     entry = gallery[row["name"]]
-    for cells, recorded in list(zip(row["cells"], row["errors"], strict=True))[: len(row["cells"]) if NIGHT else 1]:
+    for cells, recorded in list(zip(row["cells"], row["errors"], strict=True))[: len(row["cells"]) if AT_NIGHT else 1]:
         problem = entry.make(tmp_path, cells)
         error = entry.error(problem, vf.solve(problem).contact)
         assert error == pytest.approx(recorded, rel=1e-3, abs=1e-6)
@@ -69,7 +68,7 @@ def delaunay(path, corners):
 def test_near_nu_of_one_half_hertz_is_off_and_warned_of_unless_cells_are_split_by_both_diagonals(
     gallery, monkeypatch, tmp_path
 ):
-    entry, cells = gallery["cylinder-on-plane-2"], 24 if NIGHT else 6
+    entry, cells = gallery["cylinder-on-plane-2"], 24 if AT_NIGHT else 6
     monkeypatch.setattr("gallery.POISSON", 0.475)
     errors, warned = [], []
     for write in (None, delaunay):
