@@ -258,6 +258,9 @@ def test_a_bound_is_never_rounded_up_and_the_readings_solve_their_equations(thet
 
 
 @example(F(22859, 22861), F(46, 571525))  # four figures of theta alone would go back to 0.9999
+@example(F(1, 2), F(3, 4))  # one reading is left
+@example(F(1, 2), F(1))
+@example(F(1, 2), F(3))
 @given(THETAS, RATIOS)
 def test_a_theta_is_pasted_only_where_one_reading_is_left_and_is_smaller_than_that_of_a_run_that_converges(theta, r):
     found = advise_run(theta, r)
