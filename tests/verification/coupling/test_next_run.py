@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from coupling_logs import MODES, linear_run, precice
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 import verification as vf
@@ -75,6 +75,8 @@ def runs(draw):
     return found
 
 
+@example([("0.5", [1.0, 0.9])], {})  # too short to be read
+@example([(repr(theta), list(linear_run((0.5, 3.0), theta, 60)[0])) for theta in (0.2, 0.45, 0.7)], {})  # roles
 @given(runs(), st.sampled_from([{}, {"tied": True}, {"friction": True}]))
 def test_the_next_run_is_never_one_that_was_given(made, options):
     with tempfile.TemporaryDirectory() as folder:
