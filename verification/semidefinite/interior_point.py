@@ -146,7 +146,7 @@ class MatrixBlock:
         place: dict[bytes, int] = {}  # zeta and the slip are in several products
         at = [place.setdefault(row.tobytes(), len(place)) for row in np.round(both, ALIKE) + 0.0]  # no -0
         self._distinct = both[np.unique(at, return_index=True)[1]]
-        self._a, self._b = np.split(np.array(at), 2)
+        self._a, self._b = np.split(np.array(at, dtype=np.intp), 2)
         self._weighed = np.flatnonzero(self.free.any(axis=0))
         self._weights = self.free[np.ix_(self._weighed, self._weighed)]
 

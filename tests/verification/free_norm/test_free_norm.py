@@ -116,6 +116,15 @@ def test_without_friction_nothing_is_gained():
     assert largest_radius(pair, 0.7).value == pytest.approx(proof.factor, rel=1e-6)
 
 
+@pytest.mark.parametrize("young", [(1, 1), (3, 1), (1, 3)])
+def test_one_node_between_bars_contracts_for_every_theta_of_one_step(young):
+    """With bars as stiff as each other the program of the circle has no row that is not 0."""
+    found = free(vf.build(vf.example("two-bars").changed(young=young)))
+    rho = young[0] / young[1]
+    assert found.factor(0.05).factor == pytest.approx(0.95, abs=2 * NEAR)
+    assert 0.99 * min(2 / (1 + rho), 1) <= found.largest_theta().theta <= min(2 / (1 + rho), 1)
+
+
 def test_a_mirror_image_and_other_units_have_the_same_factor():
     problem = vf.Problem.from_dict(blocks(contact={"friction": "0.2", "radius": "0.6"}))
     images = [problem, problem_mirrored(problem), problem_in_units(problem, stress=Fraction(4096))]
