@@ -128,11 +128,12 @@ class Advice(Document):
             first += f"; {least} is {low:.3g}"
         if self.next is not None and abs(self.theta - theta) > SAME_THETA * theta:
             return f"{first}. So relax by theta = {self.theta:.4g}: {self.next.why}."
-        taken = f"{'at most ' * (tied or best.proved)}{in_steps(rate)} to 1e-9"
+        bounded = (tied or best.proved) and not self.coupling.parallel  # whose steps have a rate, but no such bound
+        taken = f"{'at most ' * bounded}{in_steps(rate)} to 1e-9"
         then = f"So relax by {self._formula(best, theta)} = {theta:.3g}: "
         then += self.steps_with_errors if best.level == "estimated" else taken
         linear = " if the coupling is linear" if self.declared else " if nothing opens or slips"
-        then += linear if tied else " without friction" if best.proved else " are predicted"
+        then += linear if tied else " without friction" if bounded else " are predicted"
         if other is not None:
             away = in_steps(self.chosen(other)[1]).removesuffix(" steps")
             then += ", the same with the roles exchanged" if self.no_difference else f", against {away}"
@@ -376,12 +377,12 @@ class Advice(Document):
         said, seen = f"about {self.steps_of('constant')} to 1e-6", self.vectors
         if seen is None or self.theta is None or self.coupling.parallel:
             return said
-        if None in seen.estimated_errors:
-            return f"{said} (with an error that is not known)"
         both = seen.seen, seen.seen.lowest(self.coupling.least)
         few, most = (methods.steps(each, "constant", self.theta) or 0 for each in both)
         if not most:
             return "in unknown steps (with the least eigenvalue at the end of its error none converges)"
+        if None in seen.estimated_errors:
+            return f"{said} (with an error that is not known)"
         wide = f"about {few} to {most} steps to 1e-6 (by the error of the least eigenvalue)"
         return wide if most > methods.NEAR * few else said
 

@@ -188,8 +188,9 @@ class Coupling:
             left = FIRST_ONES if self.kind.linear else 0
             forgotten, before, begins = self._seen.pop(left)
             x, Tx, anew = self._seen[left]
-            self._changed |= last_piece(np.array([before, Tx])) < 2
-            self._bore = bears(forgotten[np.newaxis], before[np.newaxis]) | (self._bore is not None and self._bore)
+            X, TX = (np.array(rows)[:, : len(g) // (1 + self.kind.parallel)] for rows in ([forgotten], [before, Tx]))
+            self._changed |= last_piece(TX) < 2
+            self._bore = bears(X, TX[:1]) | (self._bore is not None and self._bore)
             self._seen[left] = x, Tx, anew or begins
         self._anew, self._advice = False, None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar, TypeVar
 
@@ -130,7 +130,11 @@ class Evidence(Part, ABC):
         spectrum = spectrum.parallel() if self.kind.parallel else spectrum
         theta = spectrum.theta if theta is None else theta
         rows = methods.rows(spectrum, theta=theta, neumann_body=neumann_body, **{"exchanged": False} | settings)
-        return tuple(row for row in rows if not (self.kind.parallel and row.method == "aitken"))
+        if self.kind.parallel:
+            return tuple(row for row in rows if row.method != "aitken")
+        if methods.steps(spectrum.lowest(self.kind.least), "constant", theta) is None:
+            rows = tuple(replace(row, steps=None) if row.method == "constant" else row for row in rows)
+        return rows
 
     def on_estimates(self, spectrum: Spectrum, of: str, *, low_found: bool = True) -> tuple[MethodRow, ...]:
         """The methods on an estimated spectrum, in which open nodes are already, and with the roles exchanged.

@@ -47,7 +47,7 @@ class MethodRow(Part):
         r"evaluations of $T$ from $x = 0$ until $\lvert Tx - x\rvert < 10^{-6}\,\lvert Tx\rvert$, with every "
         "eigenvalue equally in the first error",
         unit="1",
-        null="where it does not arrive",
+        null="where it does not arrive, or may not by the error of the least eigenvalue",
         why=lambda row: f"not in {COUNTED if row.method == 'constant' else MOST:g} steps",
     )
     bound: str | None = key(
@@ -208,9 +208,10 @@ def _reason(taken: MethodRow, same: Sequence[MethodRow], tied: bool) -> str:
         others += ", hardly fewer" if tied or fewest.method != "iqn-ils" else " if contact does not change"
     if taken.method == "constant":
         return f"{bound}{taken.steps} steps{others or ', and no method takes fewer'}"
-    known = "more than can be counted" if constant.steps is None else f"{bound}{constant.steps}"
-    times = "" if constant.steps is None else f", {constant.steps / _count(taken):.2g} times as many"
-    return f"{taken.steps} steps; a constant theta takes {known}{times}{others}"
+    known = "may not arrive"
+    if constant.steps is not None:
+        known = f"takes {bound}{constant.steps}, {constant.steps / _count(taken):.2g} times as many"
+    return f"{taken.steps} steps; a constant theta {known}{others}"
 
 
 #: How many times the fewest steps a method may take to be advised.

@@ -284,17 +284,18 @@ def seen_in(
     changed : bool
         Whether nodes opened or closed before these iterates.
     bore : array of bool, shape (n,), optional
-        The entries that were not 0 before these iterates.
+        The forces that were not 0 before these iterates; of parallel coupling their field is the first.
 
     ValueError where the iterates, or their residuals, do not differ above rounding.
     """
     stays = _stays(X, TX, 1 + kind.parallel)
-    given, last = len(X), len(X) if kind.linear else last_piece(TX)
+    unknowns = X.shape[1] // (1 + kind.parallel)
+    forces, given = TX[:, :unknowns], len(X)  # displacements have another unit
+    last = given if kind.linear else last_piece(forces)
     changing, read = last < given, last if last >= FEWEST else given
-    loaded = bool((at_zero(TX)[-1] & (bears(X, TX) | (bore is not None and bore))).any())
+    loaded = bool((at_zero(forces)[-1] & (bears(X[:, :unknowns], forces) | (bore is not None and bore))).any())
     X, TX = X[-read:], TX[-read:]
     inside = np.ones(read - 1, dtype=bool) if starts is None else ~starts[-read + 1 :]
-    unknowns = X.shape[1] // (1 + kind.parallel)
     values, residuals, noise = _ritz(X, TX, inside, kind)
     apart = _apart(X, TX, inside)
     unsure = (noise or 0.0) * float(np.abs(values).max())

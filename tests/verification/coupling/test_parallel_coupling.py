@@ -120,6 +120,28 @@ def test_vectors_of_both_fields_show_the_eigenvalues_of_the_serial_coupling(unit
         vf.advise_vectors(np.eye(3), np.eye(3), parallel=True)
 
 
+@pytest.mark.parametrize("moved", [1, 0])
+@pytest.mark.parametrize("unit", [1.0, 1e10])
+def test_only_forces_that_are_0_show_open_nodes(unit, moved):
+    """Nothing opens, whatever the unit of displacements is, and if they begin with 0."""
+    solvers = Solvers(unit=unit)
+    solvers.moved *= moved
+    found, tied = (vf.advise_vectors(*solvers.rows(0.2, 20), kind=kind, parallel=True) for kind in ("contact", "tied"))
+    assert (found.theta, found.method.name) == (tied.theta, tied.method.name)
+    run = vf.couple(solvers.neumann, solvers.contact, start=np.zeros(12), kind="contact", parallel=True, theta=0.1)
+    assert (run.advice.tied, run.advice.method.name) == (True, tied.method.name)
+    for seen in (found.vectors, run.advice.vectors):
+        assert not seen.changing
+        assert not seen.loaded
+
+
+@pytest.mark.parametrize("kind", ["contact", "tied"])
+def test_a_rate_of_both_at_once_is_no_bound_of_steps(kind):
+    found = vf.advise_matrices(1 / 7 * np.eye(1), np.eye(1), kind=kind, parallel=True)
+    assert "steps to 1e-9" in found.quote
+    assert "at most" not in found.quote
+
+
 def test_what_leaves_the_known_directions_of_the_other_field_is_an_error():
     """Two iterates whose force has changed in one mode, and whose displacement in the other."""
     values = np.array([0.3, 4.0])

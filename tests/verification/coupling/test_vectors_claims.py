@@ -57,6 +57,9 @@ def test_no_number_of_steps_where_minus_one_is_within_the_error_of_the_least_eig
     found = vf.advise_vectors(*Linear(values, 1).run("constant", 0.5, 6), kind="general")
     assert found.spectrum.low - found.vectors.error_low < -1
     assert "in unknown steps (with the least eigenvalue at the end of its error none converges)" in found.quote
+    constant = next(row for row in found.methods if row.method == "constant")
+    assert constant.steps is None
+    assert "a constant theta may not arrive" in found.method.reason
     wide = vf.advise_vectors(*Linear(np.geomspace(0.1, 60.0, 20), 1).run("constant", 0.5, 6), kind="tied")
     assert "(by the error of the least eigenvalue)" in wide.quote
 
