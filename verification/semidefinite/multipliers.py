@@ -377,24 +377,21 @@ def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, p
         near = found.early
         return 1 - found.value
 
-    low, high, k = (0.0, 1.0), (math.inf, math.nan), start
-    while not _root_near(low, high):
-        if high[0] < LEAST * start:
-            raise LMIError(f"no friction above {high[0]:.1e} leaves multipliers that prove anything")
-        left = spare(k)
-        if left > 0:
-            low = k, left
+    left, low, high, k = {0.0: 1.0, math.inf: math.nan}, 0.0, math.inf, start
+    while not (
+        high - low <= NARROW * high < math.inf
+        or (high - low) * left[low] <= NARROW * low * (left[low] - left[high])  # the chord has its root so near
+    ):
+        if high < LEAST * start:
+            raise LMIError(f"no friction above {high:.1e} leaves multipliers that prove anything")
+        left[k] = spare(k)
+        if left[k] > 0:
+            low = k
         else:
-            high = k, left
-        guess = k / max(1 - left, 1e-3)  # c grows about linearly with k
+            high = k
+        guess = k / max(1 - left[k], 1e-3)  # c grows about linearly with k
         inside = 0.3 * NARROW * guess
-        k = guess + inside if left > 0 else guess - inside
-        if not low[0] < k < high[0]:
-            k = (low[0] + high[0]) / 2
-    return low[0]
-
-
-def _root_near(low: tuple[float, float], high: tuple[float, float]) -> bool:
-    """True if k and what is left of 1 show a root within NARROW of the lower k: by their bracket, or by the chord."""
-    (k, left), (above, lacking) = low, high
-    return above - k <= NARROW * above < math.inf or (above - k) * left <= NARROW * k * (left - lacking)
+        k = guess + inside if k == low else guess - inside
+        if not low < k < high:
+            k = (low + high) / 2
+    return low

@@ -51,14 +51,13 @@ DIGITS = 9
 class FoundFactor:
     """A piece that a search came to, and the largest ``value`` of the form on it, at the change of force ``worst``.
 
-    ``form`` is its matrix in y with ``g = root y``.
+    ``form`` is its matrix in the coordinates of the search.
     """
 
     value: float
     piece: Piece
     worst: Floats
     form: Floats
-    root: Floats
 
     @cached_property
     def size(self) -> float:
@@ -66,11 +65,6 @@ class FoundFactor:
         if dpotrf(self.form + self.value * np.eye(len(self.form)))[1] == 0:  # no eigenvalue is below -value
             return self.value
         return float(np.abs(eigvalsh(self.form)).max())
-
-    def modes(self) -> tuple[Floats, Floats]:
-        """All eigenvalues, the largest last, and the changes of force of the eigenvectors as columns."""
-        values, vectors = eigh(self.form, check_finite=False)
-        return values, self.root @ vectors
 
 
 def signs(pair: ContactPair) -> Signs:
@@ -97,8 +91,9 @@ class Search:
 
     def __init__(self, pair: ContactPair, factors: Factors, *, gram: Floats | None = None) -> None:
         self.pair, self._factors, root = pair, factors, pair.neumann.root
-        lengths = np.eye(root.shape[1]) if gram is None else cholesky(root.T @ gram @ root, lower=True)
-        self._root = root if gram is None else solve_triangular(lengths, root.T, lower=True).T
+        if gram is not None:
+            root = solve_triangular(cholesky(root.T @ gram @ root, lower=True), root.T, lower=True).T
+        self._root = root
         tangential = (0, 1, -1) if pair.rubs else (1,)  # without friction every node slides
         self.states = [(touching, slide) for touching in (True, False) for slide in tangential]
         self.sign, self._still = signs(pair), np.zeros(pair.neumann.grid.n, dtype=bool)
@@ -148,7 +143,7 @@ class Search:
                 return None
             (value,), vectors = eigh(form, subset_by_index=[len(form) - 1] * 2, check_finite=False)
             self._visited[visited] = FoundFactor(
-                value=float(value), piece=piece, worst=self._root @ vectors[:, 0], form=form, root=self._root
+                value=float(value), piece=piece, worst=self._root @ vectors[:, 0], form=form
             )
         known = self._visited[visited]
         return known if known.value > level else None
@@ -184,7 +179,7 @@ class Search:
             most = int(np.argmax(np.round(values(self._factors(made)) / size, DIGITS)))
             yield several.touching[most], several.sliding[most]
         yield from ((patterns.touching[i], patterns.sliding[i]) for i in helps)
-        exceeds = order[beside.exceed(level, *best.modes())[order]]
+        exceeds = order[self._exceed(beside, level, best)[order]]
         several = _several(best.piece.pattern, patterns, node, exceeds)
         yield from zip(several.touching, several.sliding, strict=True)
         yield from ((patterns.touching[i], patterns.sliding[i]) for i in exceeds)
@@ -195,10 +190,14 @@ class Search:
         if not len(node):  # a single contact node
             return
         beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
-        exceeds = np.flatnonzero(beside.exceed(level, *best.modes()))
+        exceeds = np.flatnonzero(self._exceed(beside, level, best))
         promised = np.round(beside.values(best.worst)[exceeds] / (best.size or 1.0), DIGITS)
         for i in exceeds[np.argsort(-promised, kind="stable")]:
             yield patterns.touching[i], patterns.sliding[i]
+
+    def _exceed(self, beside: Neighbours, level: float, best: FoundFactor) -> Bools:
+        eigenvalues, vectors = eigh(best.form, check_finite=False)
+        return beside.exceed(level, eigenvalues, self._root @ vectors)
 
     def neighbours(self, pattern: Pattern) -> tuple[Patterns, NDArray[np.intp]]:
         """The patterns that differ at one node, and which."""
