@@ -256,8 +256,10 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
     ],
     "verification/semidefinite/multipliers.py": [
         ("math.nextafter(root(found.value), math.inf)", "root(found.value)"),
-        ("if left > 0:", "if left > -1e-3:"),
-        ("return -1.0", "return 1.0"),
+        ("if left[k] > 0:", "if left[k] > -1e-3:"),
+        ("return math.nan", "return 1.0"),
+        ("(high < 1.1 * low and ", "("),
+        ("<= NARROW * low * (left", "<= low * (left"),
         ("    return low\n", "    return high\n"),
         ("(theta * (1 - share), theta)", "(theta, theta)"),
         ("definite(2.0, theta * (1 - share))", "definite(2.0, theta * (1 - 2 * share))"),

@@ -380,7 +380,7 @@ def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, p
     left, low, high, k = {0.0: 1.0, math.inf: math.nan}, 0.0, math.inf, start
     while not (
         high - low <= NARROW * high < math.inf
-        or (high - low) * left[low] <= NARROW * low * (left[low] - left[high])  # the chord has its root so near
+        or (high < 1.1 * low and (high - low) * left[low] <= NARROW * low * (left[low] - left[high]))  # by the chord
     ):
         if high < LEAST * start:
             raise LMIError(f"no friction above {high:.1e} leaves multipliers that prove anything")
