@@ -256,7 +256,7 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None, kind: Ki
         reciprocal = P is None and not contact.motions.size  # the eigenvalues of both roles
         whole = len(S_n) <= ALL
         if whole or not reciprocal:
-            values = np.maximum(eigh(S_c, S_n, eigvals_only=True, subset_by_index=None if whole else [0, 0]), 0.0)
+            values = np.maximum(eigh(S_c, S_n, eigvals_only=True), 0.0)  # of one that is multiple LAPACK finds none
         if whole:
             role = replace(role, spectrum=Spectrum.of(values * float(unit)))
         if reciprocal:

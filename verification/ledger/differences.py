@@ -353,7 +353,7 @@ def directions(setting: DrawnSetting, piece: Piece, random: np.random.Generator)
         # 2 |x| |y| <= |x|^2/r + r |y|^2 with equality at r = |x|/|y|: (5.13) where |x|/|y| is the largest there is
         r = math.sqrt(max(top(size_1, size_2), 1e-12))
         pencils += [(F, one), (F, size_1 / (2 * r) + (1 + r / 2) * size_2)]
-    worst = [eigh(form, against, subset_by_index=[len(F) - 1] * 2)[1][:, 0] for form, against in pencils]
+    worst = [eigh(form, against)[1][:, -1] for form, against in pencils]
     return worst + [random.standard_normal(len(F)) for _ in range(RANDOM_DIRECTIONS)]
 
 

@@ -185,8 +185,7 @@ class Sticks(Apart):
 
     def __init__(self, bodies: EnclosedBodies) -> None:
         pair = bodies.case.pair
-        n = len(pair.neumann.schur)
-        u = eigh(pair.contact.schur, pair.neumann.schur, subset_by_index=[n - 1] * 2)[1][:, 0]
+        u = eigh(pair.contact.schur, pair.neumann.schur)[1][:, -1]
         super().__init__(bodies, u)
         back = entries(self._S_1).times(Enclosed.exactly(u[:, None]))
         self.energy_1, self.size_1 = _form(self._S_1, u), _form(self._N_1, u).sqrt()

@@ -49,10 +49,7 @@ DIGITS = 9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FoundFactor:
-    """A piece that a search came to, and the largest ``value`` of the form on it, at the change of force ``worst``.
-
-    ``form`` is its matrix in the coordinates of the search.
-    """
+    """A piece that a search came to: ``form`` in y there, its largest ``value``, and ``worst``, the force with it."""
 
     value: float
     piece: Piece
@@ -141,9 +138,11 @@ class Search:
             if level > -np.inf and dpotrf(level * np.eye(len(form)) - form)[1] == 0:
                 self._below[visited] = level
                 return None
-            (value,), vectors = eigh(form, subset_by_index=[len(form) - 1] * 2, check_finite=False)
+            top, vectors = eigh(form, subset_by_index=[len(form) - 1] * 2, check_finite=False)
+            if not len(top):  # LAPACK finds none where many eigenvalues are the largest one
+                top, vectors = eigh(form, check_finite=False)
             self._visited[visited] = FoundFactor(
-                value=float(value), piece=piece, worst=self._root @ vectors[:, 0], form=form
+                value=float(top[-1]), piece=piece, worst=self._root @ vectors[:, -1], form=form
             )
         known = self._visited[visited]
         return known if known.value > level else None

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from problem_list import plates
-from scipy.linalg import eigh
+from scipy.linalg import eigh, eigvalsh
 from strategies import AT_NIGHT
 
 import verification as vf
@@ -262,6 +262,18 @@ def test_the_factor_found_on_section_6_is_the_one_that_a_search_node_by_node_com
     largest = np.sqrt(largest)
     assert largest > 0.45
     assert found.lower >= largest * (1 - 1e-9)
+
+
+def test_the_largest_value_on_a_piece_is_found_where_many_are_as_large():
+    """Open nodes keep (1 - theta)^2 many times; of one eigenvalue of those that are asked for LAPACK may give none."""
+    pair, random = vf.build(vf.example("section6")).swapped(), np.random.default_rng(2)
+    search = factor_search(pair, 0.1)
+    for _ in range(300):
+        touching, sliding = search.random_pattern(random)
+        sliding[random.random(len(sliding)) < random.random()] = 0
+        found = search.found(random.random(len(touching)) < random.random(), sliding)
+        assert found.value == pytest.approx(eigvalsh(found.form)[-1], rel=1e-12)
+        assert found.value == pytest.approx(pair.neumann.dual_norm(found.worst) ** 2 * found.value, rel=1e-9)
 
 
 def test_a_single_contact_node_has_no_neighbour():
