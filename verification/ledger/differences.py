@@ -15,9 +15,9 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 
 from fem1d2d.mesh import Bools, Floats
+from fem1d2d.pencil import largest
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.contact import ContactError, ContactSolution
@@ -353,7 +353,7 @@ def directions(setting: DrawnSetting, piece: Piece, random: np.random.Generator)
         # 2 |x| |y| <= |x|^2/r + r |y|^2 with equality at r = |x|/|y|: (5.13) where |x|/|y| is the largest there is
         r = math.sqrt(max(top(size_1, size_2), 1e-12))
         pencils += [(F, one), (F, size_1 / (2 * r) + (1 + r / 2) * size_2)]
-    worst = [eigh(form, against)[1][:, -1] for form, against in pencils]
+    worst = [largest(form, against).vector for form, against in pencils]
     return worst + [random.standard_normal(len(F)) for _ in range(RANDOM_DIRECTIONS)]
 
 

@@ -22,9 +22,9 @@ from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
+from fem1d2d.pencil import largest
 from fem1d2d.proofs.enclosed import Enclosed, upwards
 from fem1d2d.proofs.proved import Ends
 from ndtheory import Number
@@ -185,7 +185,7 @@ class Sticks(Apart):
 
     def __init__(self, bodies: EnclosedBodies) -> None:
         pair = bodies.case.pair
-        u = eigh(pair.contact.schur, pair.neumann.schur)[1][:, -1]
+        u = largest(pair.contact.schur, pair.neumann.schur).vector
         super().__init__(bodies, u)
         back = entries(self._S_1).times(Enclosed.exactly(u[:, None]))
         self.energy_1, self.size_1 = _form(self._S_1, u), _form(self._N_1, u).sqrt()
