@@ -136,7 +136,7 @@ class FreeNorm:
         factor = lambda theta: 1.0 if (proof := self.factor(theta, ROUGH)) is None else proof.factor
         near = min(THETA, largest / 10)
         found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": near})
-        return self.factor(float(f"{found.x:.3g}"))
+        return self.factor(min(float(f"{found.x:.3g}"), largest))
 
     def _inside(
         self, theta: float, border: tuple[float, Circle | None], share: float, at: Callable[[float], Circle | None]
