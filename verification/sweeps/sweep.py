@@ -86,7 +86,7 @@ class Sweep(Document):
         return found
 
     def plot(self, x: str = "theta", y: str = "iterations", curves: str | None = None) -> Figure:
-        """Draw one column over another, with one curve for each value of a third.
+        """Draw one column over another, with one colour for each value of a third.
 
         Raises
         ------
