@@ -54,7 +54,7 @@ def _says(theta: float, advice: Advice) -> str:
     if "level" in readings:
         return (
             f"the residual stays at a level. Without friction theta = {theta:g} converges for every rho below "
-            f"2/theta - 1 = {rho}, so rho is at least that."
+            f"2/theta - 1 = {readings['level'].lo:.2f}, so rho is at least that."
         )
     slowest = advice.logs[0].slowest
     assert slowest is not None
