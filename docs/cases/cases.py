@@ -243,8 +243,8 @@ def shear_after(i: int) -> Callable[[Any], Figure]:
         if i == 2:
             load = pushed(history.problem, history, 2)[2]
             known -= 2 * partial(x, a, a * np.sqrt(1 - (most - load) / 2))
-        figure = history.plot("shear", times=[history.increments[i].time])
-        return beside(figure.axes[0], x, -k * p0 * known)
+        figure, contact = history.plot("shear", times=[history.increments[i].time]), history.increments[i].contact
+        return beside(figure.axes[0], x + np.interp(0, contact.x, contact.s), -k * p0 * known)  # drawn over s
 
     return draw
 
