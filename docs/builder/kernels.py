@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import multiprocessing
 import os
 import sys
@@ -49,7 +50,10 @@ class Copy:
 
 
 def _become_kernel(arguments: list[str], env: dict[str, str], cwd: str | os.PathLike[str]) -> None:
+    from ipykernel.iostream import OutStream
     from ipykernel.kernelapp import launch_new_instance
+
+    OutStream.flush_interval = math.inf  # a cell's output at its end, in one part: merged parts may gain an empty line
 
     os.environ.clear()
     os.environ.update(env)

@@ -28,7 +28,7 @@ PAGES = """
         page = new_notebook(cells=[new_code_cell(source)])
         try:
             NotebookClient(page, resources={"metadata": {"path": sys.argv[2]}}).execute()
-            print(*("".join(each["text"]) for each in page.cells[0].outputs), sep="", end="")
+            print(*("".join(each["text"]) for each in page.cells[0].outputs), sep="|", end="")
         except (CellExecutionError, DeadKernelError) as error:
             print(type(error).__name__)
     print("left:", multiprocessing.active_children(), os.getcwd() == sys.argv[2])
@@ -43,16 +43,20 @@ logging.getLogger("quiet").info("not seen")
 warnings.warn("seen")
 """
 
+#: Prints in two parts, half a second from each other.
+SLOW = "import time; print('in one', end=''); time.sleep(0.5); print(' part')"
+
 
 @pytest.mark.skipif(not AT_NIGHT, reason="three seconds: by night, and every build of the site begins pages so")
 def test_a_page_begins_as_in_a_new_kernel_and_ends_with_its_kernel(site_tools, tmp_path):
-    pages = (SHOWN, "unknown", "import os; os._exit(3)", "print('the next one')")
+    pages = (SHOWN, "unknown", "import os; os._exit(3)", "print('the next one')", SLOW)
     answer = ended(PAGES, DOCS, tmp_path, *pages, env=environment(PAGE="set"))
     assert answer.returncode == 0, answer.stderr
-    here, paths, names, warned, *_, failed, dead, after, left = answer.stdout.splitlines()
+    here, paths, names, warned, *_, failed, dead, after, slow, left = answer.stdout.splitlines()
     assert here == f"{tmp_path} set"
     assert paths == "[] True"
     assert names == "False __main__"
     assert "UserWarning: seen" in warned
     assert "not seen" not in answer.stdout
-    assert (failed, dead, after, left) == ("CellExecutionError", "DeadKernelError", "the next one", "left: [] False")
+    assert (failed, dead, after, slow) == ("CellExecutionError", "DeadKernelError", "the next one", "in one part")
+    assert left == "left: [] False"
