@@ -41,12 +41,12 @@ class Examples(Document):
     units: ClassVar[Mapping[str, str]] = {"length": "see each file", "stress": "see each file"}  # type: ignore[misc]
 
     examples: Mapping[str, str] | None = key(
-        "titles by name", absent="where one was named, and with --inputs", default=None
+        "titles by name", absent="where one was named, and with `--inputs`", default=None
     )
     name: str | None = key("the example that was named", absent="where none was", default=None)
     toml: str | None = key("its text", absent="where none was named", default=None)
     written: Mapping[str, str] | None = key(
-        "what the files of --inputs hold, by their paths", absent="without --inputs", default=None
+        "what the files of `--inputs` hold, by their paths", absent="without `--inputs`", default=None
     )
 
 
