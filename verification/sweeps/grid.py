@@ -34,7 +34,7 @@ from verification.registry import LAWS, RULES
 #: Largest number of rows of a sweep, so that a typing error does not fill the memory.
 MOST_ROWS = 200_000
 
-#: Largest number of halvings of a mesh, as in `ndtheory constants --refine`.
+#: Largest number of halvings of a mesh, as in ``ndtheory constants --refine``.
 MOST_HALVINGS = 8
 
 #: The keys of a range of values.
