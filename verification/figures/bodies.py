@@ -164,7 +164,7 @@ def _ends(bodies: TwoBodies, drawn: list[Floats], scale: float, contact: Contact
         line = drawn[body][bodies.elastic[body].nodes]
         part = line[touching] if touching.sum() > 1 else line
         centre, size = (part.min(axis=0) + part.max(axis=0)) / 2, np.ptp(part, axis=0)
-        around = 3 * float(np.linalg.norm(np.diff(part, axis=0), axis=1).max())
+        around = 3 * np.median(np.linalg.norm(np.diff(line, axis=0), axis=1))  # what touches may have a gap inside
         x = centre[0] + (size.max() / 2 + around) * BOTH
         y = centre[1] + max(0.2 * np.ptp(x), size[1] / 2 + around) * BOTH
     return x + max(0.0, np.ptp(y) / TALL - np.ptp(x)) / 2 * BOTH, y

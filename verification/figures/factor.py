@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,11 @@ from verification.registry import BOUNDS, draw
 POINTS, PROVED = 80, 19
 
 
-def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
-    """Two curves for each assignment of the roles, by its label; the least proved factor is marked."""
+def draw_factor(roles: Mapping[str, EnergyConstants], unproved: Collection[str] = ()) -> Figure:
+    """Two curves for each assignment of the roles, by its label; the least proved factor is marked.
+
+    Of ``unproved`` labels only rho is used, for the predicted curve.
+    """
     thetas = np.linspace(0.01, 0.99, POINTS)
     with styled():
         figure = new_figure(7.2, 3.4)
@@ -32,6 +35,8 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
             name, rho = f"{label}: " if label else "", float(energy.at_work)
             predicted = [predicted_factor(theta, rho) for theta in thetas]
             ax.plot(thetas, predicted, "--", **look, label=f"{name}predicted, rho = {rho:.3g}")
+            if label in unproved:
+                continue
             found = [evaluate_energy(energy, float(theta)).factor for theta in thetas]
             proved = [(theta, q.value) for theta, q in zip(thetas, found, strict=True) if q is not None]
             if proved:
@@ -86,13 +91,14 @@ def _(result: Measured) -> Figure:
 @draw.register
 def _(result: Advice) -> Figure:
     """The factor of one step over theta, for each assignment of the roles."""
-    if result.why_no_theta:
-        raise ValueError(result.why_no_theta)
     known = {
         f"Neumann {result.evidence.words(role.neumann_body)}" if role.neumann_body else "that run": role
         for role in result.roles
+        if role.theta_predicted is not None
     }
+    if result.why_no_theta or not known:
+        raise ValueError(result.why_no_theta or result.best.reason["theta_predicted"])
     energy = {
         name: role.energy or EnergyConstants(rho=role.rho.value) for name, role in known.items() if role.rho is not None
     }
-    return draw_factor(energy)
+    return draw_factor(energy, [name for name, role in known.items() if role.theta_proved is None])

@@ -20,6 +20,9 @@ from verification.sweeps.region import Plane, Point
 
 SMALL = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}
 
+#: Iterates of two unknowns.
+VECTORS = np.array([[1.0, 1.0], [0.5, -0.2], [0.1, 0.7], [-0.3, 0.2]])
+
 
 @pytest.fixture(scope="module")
 def problem() -> vf.Problem:
@@ -191,6 +194,19 @@ def test_what_has_no_screen_is_shown_as_its_document():
 def test_what_has_nothing_to_draw_says_so(problem):
     with pytest.raises(ValueError, match="next"):
         vf.advise_run("0.1", "1.4").plot()
+    below = np.diag([-0.4, 0.3])
+    with pytest.raises(ValueError, match="no eigenvalue is known to be 0"):
+        vf.advise_vectors(VECTORS, -VECTORS @ below, kind="general").plot()
+
+
+def test_the_figure_of_an_advice_has_a_proved_curve_only_where_something_is_proved(problem):
+    local = problem.changed(law="local", radius=None)
+    matrices = vf.advise_matrices(np.diag([1.0, 2.0]), np.eye(2))
+    estimated = vf.advise_vectors(VECTORS, 1 - VECTORS @ np.diag([0.3, 2.0]), kind="tied")
+    for advice, proved in ((vf.advise(problem), 2), (matrices, 2), (vf.advise(local), 0), (estimated, 0)):
+        labels = [str(line.get_label()) for line in advice.plot().axes[0].get_lines()]
+        assert sum(label.endswith("proved") for label in labels) == proved
+        assert sum("predicted" in label for label in labels) == len(advice.roles)
 
 
 class Heights(Document):

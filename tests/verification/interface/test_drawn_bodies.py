@@ -160,6 +160,21 @@ def test_the_zoom_shows_what_touches_and_little_else(runs):
     assert high - low < np.ptp(touching) + 7 * 0.02
 
 
+def test_the_zoom_is_no_wider_where_the_bodies_touch_only_at_both_ends():
+    parts = {"mid": ["0.8", "1.2"], "low": ["0.4", "0.5"], "high": ["1.5", "1.6"]}
+    lifted = {
+        "y": [0, "0.1"],
+        "cells": [24, 3],
+        "parts": {name: {"side": "top", "x": ends} for name, ends in parts.items()},
+        "prescribed": {"mid": [0, "0.001"]},
+        "traction": {"low": [0, -300], "high": [0, -300]},
+    }
+    solved = vf.solve(vf.Problem.from_dict(changed(body2=lifted)))
+    assert set(solved.contact.status[10:15]) == {"open"} != {solved.contact.status[0], solved.contact.status[-1]}
+    zoomed, whole = (np.ptp(draw_bodies(solved, zoom=part).axes[0].get_xlim()) for part in (True, False))
+    assert zoomed < whole
+
+
 def test_cells_have_the_colour_of_their_stress(runs):
     """Under the middle of a wide block the stress sigma_yy is minus the pressure."""
     run = runs["section 6"]
