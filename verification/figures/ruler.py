@@ -18,20 +18,16 @@ def draw_ruler(found: Comparison) -> Figure:
         figure = new_figure(7.2, 1.3 + 0.3 * len(marks))
         ax = figure.subplots()
         for i, mark in enumerate(marks):
-            ax.plot([1, mark.steps], [i, i], color=mark.colour, linewidth=1.2, alpha=0.5)
-            ax.plot([mark.steps], [i], "<" if mark.promised else "o", color=mark.colour, markersize=6)
-            count = f"{mark.steps}" if mark.steps < 1e5 else f"{mark.steps:.1e}"
-            ax.annotate(
-                f"at most {count}" if mark.promised else count,
-                (mark.steps, i),
-                (8, 0),
-                textcoords="offset points",
-                va="center",
-            )
-        ax.set(xscale="log", xlim=(1, 30 * max((mark.steps for mark in marks), default=1)))
+            steps = float(mark.steps)  # which may be no integer of numpy
+            ax.plot([1, steps], [i, i], color=mark.colour, linewidth=1.2, alpha=0.5)
+            ax.plot([steps], [i], "<" if mark.promised else "o", color=mark.colour, markersize=6)
+            count = f"{mark.steps}" if steps < 1e5 else f"{steps:.1e}"
+            words = f"at most {count}" if mark.promised else count
+            ax.annotate(words, (steps, i), (8, 0), textcoords="offset points", va="center")
+        ax.set(xscale="log", xlim=(1, min(30.0 * max((mark.steps for mark in marks), default=1), 1e250)))
         ax.set_yticks(range(len(marks)), [mark.name for mark in marks])
         ax.set_ylim(len(marks) - 0.4, -0.6)
         none = f"; no promise by {', '.join(silent)}" if silent else ""
-        ax.set_xlabel(f"steps to {tolerance:.0e}{none}")
+        ax.set_xlabel(f"steps to {tolerance:g}{none}")
         ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}, k = {float(run.pair.friction):g}")
     return figure

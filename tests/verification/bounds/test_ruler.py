@@ -11,7 +11,7 @@ from verification.algorithm.rates import steps
 from verification.bounds.bound import BoundResult
 from verification.bounds.ruler import OBSERVED, PREDICTED, promised, ruler
 from verification.bounds.verdicts import Judgement
-from verification.figures import draw_ruler
+from verification.figures import draw_ruler, save
 
 
 def result(factor: Number, rest: Number) -> BoundResult:
@@ -47,6 +47,15 @@ def test_the_marks_of_a_run_are_in_order_and_what_is_promised_covers_what_is_see
     axes = draw_ruler(found).axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == list(marks)
     assert axes.get_xlabel() == "steps to 1e-09; no promise by printed, repaired"
+
+
+def test_the_ruler_draws_more_steps_than_an_integer_of_64_bits_has(tmp_path):
+    slow = vf.example("two-bars").with_theta(1e-25)
+    slow = replace(slow, iteration=replace(slow.iteration, tolerance=2.5e-7, max_iterations=3))
+    figure = draw_ruler(vf.compare(slow, bounds=["energy"]))
+    save(figure, tmp_path / "ruler.png")
+    assert figure.axes[0].get_xlim()[1] > 1e26
+    assert figure.axes[0].get_xlabel() == "steps to 2.5e-07"
 
 
 def test_the_first_screen_shows_each_violation():
