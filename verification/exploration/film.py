@@ -53,7 +53,7 @@ class FilmedRun(Part):
     be, but leave the picture.  By step ``frames``, shape (steps, bytes), have displacements along Gamma_c of body 1 and
     of body 2, pressure and shear at the contact nodes, each in 127ths of its size, and the states of these nodes;
     ``sizes`` the largest displacement and the largest stress.  ``factors`` are what each bound proves for one step;
-    None where it has no conclusion.
+    None where it has no conclusion, and of a history.
     """
 
     theta: float = key()
@@ -113,7 +113,7 @@ def film(
         there = pair.at(friction=k)
         # bounds take a double
         try:
-            subject = Subject.of(there, measured.with_friction(float(k)))
+            subject = None if there.outside else Subject.of(there, measured.with_friction(float(k)))
         except ValueError:  # a constant is infinite: no bound applies
             subject = None
         line = []
@@ -171,7 +171,7 @@ def past(history: History) -> FilmedRun:
         left_out=0,
         frames=np.stack([frame for frame, _ in shown]),
         sizes=tuple(size for _, size in shown),
-        factors={name: None if bound.factor is None else bound.factor.value for name, bound in history.bounds.items()},
+        factors=dict.fromkeys(history.bounds),
     )
 
 

@@ -140,7 +140,7 @@ class Exploration(Document):
     def _role(self, found: Film) -> dict[str, Any]:
         energy = found.measured.energy_constants()
         k = float(found.pair.friction)
-        per_friction = energy is not None and k > 0
+        rubs = k > 0 and not found.pair.outside
         return {
             "neumann": found.pair.neumann_body,
             "name": PLACES[found.pair.neumann_body],
@@ -148,7 +148,7 @@ class Exploration(Document):
             "normals": found.pair.contact.grid.upright.round(6).tolist(),
             "rho": None if energy is None else float(energy.rho),
             "best": None if energy is None else float(predicted_theta(float(energy.rho))),
-            "kappa": [float(energy.kappa_1) / k, float(energy.kappa_2) / k] if per_friction and energy else None,
+            "kappa": [float(energy.kappa_1) / k, float(energy.kappa_2) / k] if rubs and energy else None,
             "regions": [_corners(found.regions.get(name)) for name in self._bounds],
             "whyNoRegion": found.why_no_region,
             **packed(found),

@@ -107,6 +107,15 @@ def test_the_line_of_the_bound_is_that_of_the_bound_at_each_friction(found, data
                 assert [k * kappa for kappa in role["kappa"]] == pytest.approx(expected)
 
 
+def test_no_bound_is_drawn_outside_the_theorem():
+    local = vf.explore(plates(10).changed(law="local", radius=None, friction="1/100"))
+    for role, each in zip(data_of(local)["roles"], local.films, strict=True):
+        assert each.measured.energy_constants() is not None
+        assert role["kappa"] is None
+        proved = [any(run.factors["energy"] is not None for run in line) for line in each.lines]
+        assert proved == [k == 0 for k in local.frictions]
+
+
 def numbers(text, kind):
     return np.frombuffer(base64.b64decode(text), dtype=kind).astype(float)
 
