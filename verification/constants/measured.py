@@ -63,9 +63,10 @@ _RHO_CELLS = says(
 )
 
 MATRICES, FRICTIONLESS = "of a pair made from matrices", "without a law of friction"
-APART = "where they hold different components"
+LARGE = "above 2000 contact nodes"
+APART = f"{LARGE} where the bodies hold different components of them"
 KAPPA = "$k C_s C_{t1}$ and $k C_s C_{t2}$ with the largest $k$"
-NO_KAPPA = f"{APART}, and with friction where $C_{{t1}}$ is infinite"
+NO_KAPPA = f"with friction {LARGE}, `kappa_1` also where $C_{{t1}}$ is infinite"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -102,18 +103,19 @@ class Measured(Document):
     )
     rho_min: Number | None = key(
         "the smallest such ratio; 0 where the Neumann grid has more nodes than the contact grid, or only contact holds "
-        "the contact body"
+        "the contact body",
+        null=APART,
     )
     rho_normal: Number | None = key("the largest without tangential forces", null=APART)
     C_s_energy: Number | None = key("`C_s` in energy norms", unit="√(stress/length)", null=FRICTIONLESS)
     C_t1: Number | None = key(
         "of the tangential trace of the contact body in energy norms",
         unit="√(length/stress)",
-        null=f"{APART}, also where it is infinite: only contact holds the contact body, and a rigid motion of it is "
+        null=f"{LARGE}, also where it is infinite: only contact holds the contact body, and a rigid motion of it is "
         r"tangential on $\Gamma_c$",
     )
     C_t2: Number | None = key(
-        "of the tangential trace of the Neumann body in energy norms", unit="√(length/stress)", null=APART
+        "of the tangential trace of the Neumann body in energy norms", unit="√(length/stress)", null=LARGE
     )
     kappa_1: Number | None = key(KAPPA, null=NO_KAPPA)
     kappa_2: Number | None = key(KAPPA, null=NO_KAPPA)
