@@ -116,7 +116,7 @@ NAMED: Mapping[str, Mapping[str, Any]] = {
     },
 }
 
-#: The problems that are decided with enclosures: on the last one doubles do not even tell equal sides.
+#: The problems that are decided with enclosures: on the last one equal sides differ in doubles by more than ALLOWANCE.
 ENCLOSED: Mapping[str, Mapping[str, Any]] = {
     **NAMED,
     # much friction: C_tr into L2 is 78, into H^1/2 it is 1

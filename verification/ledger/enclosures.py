@@ -490,7 +490,7 @@ def on_bodies(bodies: EnclosedBodies, id: str, of: Aspect) -> Evidence | None:
     at_least = lambda digits: float(directed(low, digits, up=False))
     at_most = lambda digits: float(directed(high, digits, up=True))
     said = f"left/right >= {at_least(4):.4g}" if fails else f"left/right <= {at_most(4):.4g}"
-    squares = ", of their squares" if key in OF_BODIES else ""
+    squares = ", of their squares" if ENTRIES[key].squares or id == "x-ratio" else ""
     in_unit = "" if unit == OWN else f", unit {float(unit):g}"
     data: dict[str, Any] = {
         "where": where,

@@ -86,6 +86,7 @@ def test_the_ratio_of_two_bodies_in_doubles_lies_between_the_bounds(found, bodie
     tally = WorstTally(inequality=ENTRY[key])
     tally.take(case, case)
     squared = 1 if key[0].startswith("x-") else 2
+    assert ("of their squares" in evidence.text) == (squared == 2)
     low, high = evidence.data["ratio"]
     assert low * (1 - 1e-9) <= tally.by_unit[1.0][0] ** squared <= high * (1 + 1e-9)
 
