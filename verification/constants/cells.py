@@ -92,14 +92,13 @@ def halved_cells(problem: Problem) -> FacingLayers:
         raise NoCells(
             "the contacts are tables [[contact]]" if problem.several else "Gamma_c is a named line, of any shape"
         )
-    bodies = {name: getattr(problem, name) for name in ("body1", "body2")}
-    for (name, body), side in zip(bodies.items(), SIDES, strict=True):
+    for (i, body), side in zip(problem.bodies.items(), SIDES, strict=True):
         if body.shape != "rectangle":
-            raise NoCells(f"{name} is not a rectangle of equal cells")
+            raise NoCells(f"body{i} is not a rectangle of equal cells")
         if why := lacks(assembly.rectangle_of_cells((0.0, 1.0), (0.0, 1.0), (1, 1)), "waves"):
-            raise NoCells(f"{name}: {why}")
+            raise NoCells(f"body{i}: {why}")
         if side in body.fixed or side in body.prescribed:
-            raise NoCells(f"{name} is held along Gamma_c")
+            raise NoCells(f"body{i} is held along Gamma_c")
     contact, neumann = _roles(problem)
     (a, _), (b, _) = size_c, size_n = _cell(contact), _cell(neumann)
     ratio = a / b

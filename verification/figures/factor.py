@@ -43,7 +43,7 @@ def draw_factor(roles: Mapping[str, EnergyConstants], unproved: Collection[str] 
                 ax.plot(*zip(*proved, strict=True), "-", **look, label=f"{name}proved")
             best = evaluate_energy(energy)
             if best.theta_proved is not None and best.factor_proved is not None:
-                ax.plot([best.theta_proved], [best.factor_proved.value], "o", color=colour, markersize=5)
+                ax.plot(best.theta_proved, best.factor_proved.value, "o", color=colour, markersize=5)
         _finish(ax, "How much one step changes the distance of two forces")
     return figure
 
@@ -53,7 +53,7 @@ def draw_proved(found: Comparison) -> Figure:
 
     The free norm is not the norm of the other curves, and the rate of the run is one of many steps.
     """
-    thetas = np.linspace(0.05, 0.95, PROVED)
+    thetas = np.linspace(0.05, 0.95, PROVED).tolist()
     subject, rho = Subject.of(found.run.pair, found.measured), found.measured.rho_max
     with styled():
         figure = new_figure(7.2, 3.4)
@@ -62,13 +62,11 @@ def draw_proved(found: Comparison) -> Figure:
             predicted = [predicted_factor(theta, rho.value) for theta in thetas]
             ax.plot(thetas, predicted, "--", color="0.5", label=f"predicted, rho = {rho.value:.3g}")
         for bound in (BOUNDS[result.name] for result in found.computed if not BOUNDS[result.name].finding):
-            factors = [np.nan if q is None else q for q in bound.curve(subject, [float(theta) for theta in thetas])]
+            factors = np.array(bound.curve(subject, thetas), dtype=float)  # None is not a number
             if not np.isnan(factors).all():
                 ax.plot(thetas, factors, color=bound.colour, linestyle=bound.dashes, label=bound.words)
         if found.run.observed_rate is not None and found.run.converged:
-            ax.plot(
-                [float(found.run.theta)], [found.run.observed_rate.value], "o", color="0.1", label="rate of the run"
-            )
+            ax.plot(float(found.run.theta), found.run.observed_rate.value, "o", color="0.1", label="rate of the run")
         _finish(ax, f"{plain(found.run.pair.title)}: k = {float(found.run.pair.friction):g}")
     return figure
 

@@ -29,7 +29,7 @@ def draw_layer_plane(found: Layers) -> Figure:
                 k = [max(search.allowed(disk(float(theta), q)).friction, 0.0) for theta in thetas]
                 ax.plot(thetas, k, style, color=colour, label="contracts below" if q == 1 else f"by {q:g}")
             if role.theta is not None:
-                ax.plot([role.theta], [float(found.friction)], "o", color="black", markersize=4)
+                ax.plot(role.theta, float(found.friction), "o", color="black", markersize=4)
             ax.set(xlim=(0, 1), xlabel=THETA, title=f"Neumann body {role.neumann}")
         panels[0].set(ylim=(0, None), ylabel="coefficient of friction k")
         legend_beside(panels[1])

@@ -20,7 +20,7 @@ def draw_ruler(found: Comparison) -> Figure:
         for i, mark in enumerate(marks):
             steps = float(mark.steps)  # which may be no integer of numpy
             ax.plot([1, steps], [i, i], color=mark.colour, linewidth=1.2, alpha=0.5)
-            ax.plot([steps], [i], "<" if mark.promised else "o", color=mark.colour, markersize=6)
+            ax.plot(steps, i, "<" if mark.promised else "o", color=mark.colour, markersize=6)
             count = f"{mark.steps}" if steps < 1e5 else f"{steps:.1e}"
             words = f"at most {count}" if mark.promised else count
             ax.annotate(words, (steps, i), (8, 0), textcoords="offset points", va="center")
