@@ -37,8 +37,9 @@ def draw_factor(roles: Mapping[str, EnergyConstants], unproved: Collection[str] 
             ax.plot(thetas, predicted, "--", **look, label=f"{name}predicted, rho = {rho:.3g}")
             if label in unproved:
                 continue
-            found = [evaluate_energy(energy, float(theta)).factor for theta in thetas]
-            proved = [(theta, q.value) for theta, q in zip(thetas, found, strict=True) if q is not None]
+            proved = [
+                (theta, q.value) for theta in thetas if (q := evaluate_energy(energy, float(theta)).factor) is not None
+            ]
             if proved:
                 ax.plot(*zip(*proved, strict=True), "-", **look, label=f"{name}proved")
             best = evaluate_energy(energy)

@@ -27,8 +27,8 @@ def draw_region(plane: Plane) -> Figure:
     Above, all of the plane on logarithmic axes; below, on linear ones, the part in which something is proved.
     Between two computed frictions the border is a straight line on linear axes.
     """
-    ends = [hi for region in plane.regions.values() for _, hi in region.theta]
-    frictions = [k for region in plane.regions.values() for k in region.k]
+    ends = [hi for region in plane.regions.values() for _, hi in region.theta] or [1.0]
+    frictions = [k for region in plane.regions.values() for k in region.k] or [point.k for point in plane.points]
     left, bottom = 10 ** (-2) * min(ends), 0.1 * min(frictions)
     varies = plane.problem.varies
     highest = max([*frictions, *(p.k for p in plane.points)])

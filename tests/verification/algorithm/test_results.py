@@ -209,6 +209,15 @@ def test_the_figure_of_an_advice_has_a_proved_curve_only_where_something_is_prov
         assert sum("predicted" in label for label in labels) == len(advice.roles)
 
 
+def test_a_plane_in_which_no_bound_has_a_region_shows_its_runs(problem):
+    point = Point(theta=0.4, k=0.01, outcome=Outcome.CONVERGED, iterations=12, coupled_residual=1e-9)
+    reason = {"lmi": "62 contact nodes: worked out up to 61"}
+    plane = Plane(title="none", regions={}, points=(point,), reason=reason, units=problem.units, problem=problem)
+    for ax in plane.plot().axes:
+        low, high = ax.get_ylim()
+        assert low < point.k < high
+
+
 class Heights(Document):
     """A result that no figure of ours is about."""
 
