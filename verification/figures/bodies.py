@@ -155,8 +155,8 @@ def _ends(bodies: TwoBodies, drawn: list[Floats], scale: float, contact: Contact
     if len(drawn) == 1:  # what of the obstacle lies opposite the body, not further away than a fifth of its size
         face, near = _obstacle(bodies, scale), 0.2 * np.ptp(points, axis=0).max()
         opposite = face[((face > points.min(axis=0) - near) & (face < points.max(axis=0) + near)).any(axis=1)]
-        seen = np.clip(opposite[:, 1], y[0] - near, y[1] + near)
-        y = np.array([min(y[0], *seen), max(y[1], *seen)])
+        seen = np.clip([*y, *opposite[:, 1]], y[0] - near, y[1] + near)
+        y = np.array([seen.min(), seen.max()])
     if contact is None:
         x, y = x + 0.04 * np.ptp(x) * BOTH, y + 0.06 * np.ptp(y) * BOTH
     else:

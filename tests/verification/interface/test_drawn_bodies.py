@@ -175,6 +175,17 @@ def test_the_zoom_is_no_wider_where_the_bodies_touch_only_at_both_ends():
     assert zoomed < whole
 
 
+@pytest.mark.parametrize("ends", [{}, {"x": ["-5", 5]}])
+def test_an_obstacle_that_is_far_away_is_out_of_the_picture(ends):
+    block = {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [2, 2], "young": 1, "poisson": 0}
+    upper = block | {"prescribed": {"top": [0, "-0.1"]}}
+    far = {"body1": {"shape": "rigid", **ends}, "body2": upper, "contact": {"gap": 3, "friction": 0}}
+    solved = vf.solve(vf.Problem.from_dict(far))
+    assert solved.contact.apart
+    low, high = draw_bodies(solved).axes[0].get_ylim()
+    assert -0.5 < low < 0 < 0.9 < high < 1.5
+
+
 def test_cells_have_the_colour_of_their_stress(runs):
     """Under the middle of a wide block the stress sigma_yy is minus the pressure."""
     run = runs["section 6"]
