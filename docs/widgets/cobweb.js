@@ -59,7 +59,7 @@ nd.onPage("cobweb", (figure) => {
     const worst = ndFormulas.predictedFactor(t, rho);
     const error = Math.abs(path[steps] - fixed), lowest = Math.abs(t - best) < 0.005 ? " This is theta = 2/(2 + rho), where it is least." : "";
     widget.says.textContent = `theta = ${t.toFixed(2)}: in contact each step multiplies the error by ${nd.short(closed)}, apart by `
-      + `${nd.short(open)}. ${worst < 1 ? `The larger one is below 1: every start converges.${lowest}` : `The larger one is not below 1: the iteration cycles.`} `
+      + `${nd.short(open)}. ${worst < 1 - 1e-9 ? `The larger one is below 1: every start converges.${lowest}` : worst > 1 + 1e-9 ? "The larger one is above 1: the iteration cycles." : "The larger one is 1: an error in contact keeps its size."} `
       + `After ${steps} steps the force is ${nd.short(path[steps])}, off by ${nd.short(error)}.`;
     nd.fill(widget.table, ["step", "force g", "error"], path.slice(0, 13).map((g, i) => [i, nd.digits(g), nd.digits(Math.abs(g - fixed))]));
   }

@@ -5,6 +5,9 @@ nd.onPage("plane", (figure) => {
   const f = ndFormulas, base = ndData.plane;
   const LOW = 1e-52, HIGH = 10, LEAST = 1e-18, ZOOM = 0.6, ROWS = 140;
 
+  // The three digits of a number that its slider shows, with which the page computes.
+  const decimal = (v) => Number((10 ** v).toPrecision(3)), shown = (v) => nd.short(decimal(v));
+
   const widget = nd.build(figure, {
     name: "plane",
     question: "Which region moves when stresses are written in GPa instead of MPa?",
@@ -17,10 +20,10 @@ nd.onPage("plane", (figure) => {
     show: () => { unit.value = 3; },
     draw,
   });
-  const theta = nd.slider(widget, { name: "theta", label: "theta", low: -18, high: -0.001, step: 0.001, value: Math.log10(0.6), show: (v) => nd.short(10 ** v) });
-  const friction = nd.slider(widget, { name: "k", label: "friction k", low: -52, high: 0.9, step: 0.001, value: Math.log10(0.2), show: (v) => nd.short(10 ** v) });
-  const ratio = nd.slider(widget, { name: "ratio", label: "E1/E2", low: -1.7, high: 1.7, step: 0.01, value: Math.log10(3.5), show: (v) => nd.short(10 ** v) });
-  const unit = nd.slider(widget, { name: "unit", label: "unit of stress", low: -3, high: 6, step: 0.1, value: 0, show: (v) => `${nd.short(10 ** v)} MPa` });
+  const theta = nd.slider(widget, { name: "theta", label: "theta", low: -18, high: -0.001, step: 0.001, value: Math.log10(0.6), show: shown });
+  const friction = nd.slider(widget, { name: "k", label: "friction k", low: -52, high: 0.9, step: 0.001, value: Math.log10(0.2), show: shown });
+  const ratio = nd.slider(widget, { name: "ratio", label: "E1/E2", low: -1.7, high: 1.7, step: 0.001, value: Math.log10(3.5), show: shown });
+  const unit = nd.slider(widget, { name: "unit", label: "unit of stress", low: -3, high: 6, step: 0.1, value: 0, show: (v) => `${shown(v)} MPa` });
   const zoom = nd.button(widget, "zoom", "zoom in, linear", () => {});
   const X = { low: LEAST, high: 1, log: true, name: "theta" };
   const Y = { low: LOW, high: HIGH, log: true, name: "friction k" };
@@ -30,11 +33,11 @@ nd.onPage("plane", (figure) => {
 
   // The constants at a ratio of the moduli and a unit of stress (MPa).
   function constants(u) {
-    const E1 = base.E2 * 10 ** ratio.value, E2 = base.E2;
+    const rate = decimal(ratio.value), E1 = base.E2 * rate, E2 = base.E2;
     const [m, M, scale] = f.constants(E1, E2, u, base.m1, base.m2, base.M1, base.M2, base.Cs1, base.Cs2, base.Ctr);
     return {
       m, M, CR: base.CR, scale,
-      rho: base.rho * E2 / E1, kappa1: base.CsEnergy * base.Ct1 * Math.sqrt(E1 / E2), kappa2: base.CsEnergy * base.Ct2,
+      rho: base.rho / rate, kappa1: base.CsEnergy * base.Ct1 * Math.sqrt(rate), kappa2: base.CsEnergy * base.Ct2,
     };
   }
 
@@ -70,7 +73,7 @@ nd.onPage("plane", (figure) => {
   }
 
   function draw() {
-    const c = constants(10 ** unit.value), inMPa = constants(1), k = 10 ** friction.value, t = 10 ** theta.value, close = zoom.on;
+    const c = constants(decimal(unit.value)), inMPa = constants(1), k = decimal(friction.value), t = decimal(theta.value), close = zoom.on;
     if (close) chart.axes({ low: 0, high: 1, name: "theta" }, { low: 0, high: ZOOM, name: "friction k" });
     else chart.axes(X, Y);
     chart.clear();

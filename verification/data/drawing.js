@@ -128,7 +128,7 @@ window.nd = (() => {
   // The state of all widgets lives behind the # of the address: widget.name=value, joined by &.
   function remembered(widget) {
     const found = {};
-    for (const part of decodeURIComponent(location.hash.slice(1)).split("&")) {
+    for (const part of location.hash.slice(1).replace(/%(3D|26|2B)/gi, decodeURIComponent).split("&")) {
       const match = part.match(/^(\w+)\.(\w+)=([-\w.+]+)$/);
       if (match && match[1] === widget) found[match[2]] = match[3];
     }
@@ -139,10 +139,10 @@ window.nd = (() => {
   function slider(widget, { name, label, low, high, step, value, show = (v) => String(v) }) {
     const given = Number(remembered(widget.name)[name]);
     const start = Number.isFinite(given) && remembered(widget.name)[name] !== undefined ? Math.min(high, Math.max(low, given)) : value;
-    const output = html("output", {}, show(start));
-    const input = html("input", { type: "range", min: low, max: high, step, value: start, name, "aria-label": label,
-      oninput: () => { if (widget.answered) widget.told.dataset.past = ""; output.textContent = show(Number(input.value)); input.setAttribute("aria-valuetext", output.textContent); widget.update(); } });
-    input.setAttribute("aria-valuetext", output.textContent);
+    const output = html("output"), input = html("input", { type: "range", min: low, max: high, step, value: start, name, "aria-label": label,
+      oninput: () => { if (widget.answered) widget.told.dataset.past = ""; say(); widget.update(); } });
+    const say = () => { output.textContent = show(Number(input.value)); input.setAttribute("aria-valuetext", output.textContent); };
+    say(); // of the step next to the value that was given
     widget.controls.append(html("label", {}, html("span", {}, label), input, output));
     widget.sliders[name] = input;
     return {
