@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Set
+from functools import partialmethod
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.config import Config
 from sphinx.errors import ExtensionError
+from sphinx.ext.napoleon import NumpyDocstring
 from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
@@ -275,8 +277,23 @@ def write_notebooks(app: Sphinx, failed: Exception | None) -> None:
                 raise ExtensionError(f"{page}: no cell glues this, and no reference leads to it: {error}") from None
 
 
+def read_as_written() -> None:
+    """Have napoleon leave two things as they are written.
+
+    The docstring of a value or a property is text: what is before a colon is not its type. A line ``a, b : float`` of a
+    list of attributes is about both, as one of parameters is.
+    """
+
+    def all_of_it(self: NumpyDocstring) -> tuple[str, list[str]]:
+        return "", NumpyDocstring(self._dedent(self._consume_to_end()), self._config).lines()
+
+    NumpyDocstring._consume_inline_attribute = all_of_it
+    NumpyDocstring._consume_fields = partialmethod(NumpyDocstring._consume_fields, multiple=True)
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Connect all of it."""
+    read_as_written()
     app.add_domain(Proofs, override=True)
     app.add_directive("widget", WidgetDirective)
     app.add_directive("course", CourseDirective)

@@ -5,6 +5,8 @@ import pkgutil
 import re
 from pathlib import Path
 
+from processes import ended
+
 import verification as vf
 
 
@@ -70,3 +72,27 @@ def test_a_function_on_the_api_page_links_to_its_result(builder):
     assert builder.api.returned(vf.solve) == builder.api.link(vf.Solution)
     assert builder.api.returned(vf.schema) == "`dict`"
     assert builder.api.returned(vf.Run) == ""
+
+
+#: Shows as lines of reStructuredText what a docstring of a value and a list of attributes become.
+SHOWN = """
+    import sys
+
+    sys.path.append(sys.argv[1])
+    from builder.pages import read_as_written
+    from sphinx.ext.napoleon import Config, NumpyDocstring
+
+    read_as_written()
+    config = Config(napoleon_use_ivar=True)
+    print(NumpyDocstring("Nodes at most: more\\nfill the memory.", config, what="data", name="MOST"))
+    body = "A body.\\n\\nAttributes\\n----------\\nE, nu : float\\n    Moduli."
+    print(NumpyDocstring(body, config, what="class", name="Body"))
+"""
+
+
+def test_the_text_of_a_value_is_text_and_each_attribute_of_a_line_has_a_name(site_tools):
+    answer = ended(SHOWN, Path(__file__).parents[2] / "docs")
+    assert answer.returncode == 0, answer.stderr
+    lines = [line.strip() for line in answer.stdout.splitlines() if line.strip()]
+    assert lines[:2] == ["Nodes at most: more", "fill the memory."]
+    assert [line.rstrip() for line in lines if line.startswith(":ivar")] == [":ivar E: Moduli.", ":ivar nu: Moduli."]
