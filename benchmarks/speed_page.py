@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -115,7 +116,7 @@ def section(record: dict[str, Any]) -> Iterator[str]:
     yield f"- *ours*: {record['ours']}."
     if peer:
         yield f"- *{peer}*: {record['other']}."
-    yield from (f"- Measured is the {record['quantity']}." if record["quantity"] != "CPU time" else "", "")
+    yield from (f"- The {record['quantity']} is measured." if record["quantity"] != "CPU time" else "", "")
     against = [peer, "ours / other"] if peer else []
     head = [record["size"]] * sized + ["ours", *against, "rounds"] + ["apart"] * compared
     yield from (line(head), line(["--:"] * len(head)))
@@ -173,6 +174,8 @@ def draw(record: dict[str, Any]) -> Figure:
                 label = name if power is None else f"{name}, $n^{{{power:.2f}}}$"
                 ax.loglog(*zip(*points, strict=True), line_style, color=colour, markerfacecolor=inside, label=label)
         sizes = [row["size"] for row in record["rows"]]
+        if len(sizes) > 6:  # so many numbers run into each other
+            sizes = sizes[::-2]
         ax.xaxis.set_major_locator(FixedLocator(sizes))
         ax.xaxis.set_major_formatter(
             FuncFormatter(lambda size, _: f"{size:,.0f}" if size < 10_000 else f"{size / 1e3:.0f}k")
@@ -180,6 +183,6 @@ def draw(record: dict[str, Any]) -> Figure:
         ax.xaxis.set_minor_locator(NullLocator())
         ax.set_xlabel(record["size"])
         ax.set_ylabel(f"{record['quantity']} [{record['unit']}]")
-        ax.set_title(record["title"])
+        ax.set_title(fill(record["title"], 40))
         ax.legend()
     return figure
