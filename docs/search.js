@@ -72,7 +72,8 @@
     return docnames.map((name, file) => {
       const inText = (one) => (one.files.has(file) ? one.share : 0);
       const { score, chosen } = scored(query, phrases[file], inText, weightOf(name));
-      const title = chosen?.title ? `${titles[file]} > ${chosen.title}` : titles[file];
+      const section = chosen?.title?.replace(/\\le\b/g, "<=").replace(/\\ge\b/g, ">=").replace(/\\([A-Za-z]+)/g, "$1");
+      const title = section ? `${titles[file]} > ${section}` : titles[file];
       const exact = (SEARCH.words[name] ?? []).some((phrase) => phrase.toLowerCase() === typed) ? 2 : 1;
       return [name, title, chosen?.anchor ?? "", excerptOf(name), exact * score, filenames[file], SearchResultKind.text];
     });

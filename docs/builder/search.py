@@ -105,9 +105,23 @@ TITLE = re.compile(r"^# .*\n", re.MULTILINE)
 FENCED = re.compile(r"^(```+|:::+).*?^\1$", re.DOTALL | re.MULTILINE)
 NO_TEXT = re.compile(r"[:%|({#<!$-]|\*\{\{")
 MARKS = re.compile(r"\{[\w:]+\}`(?:([^`<]+?) ?<[^`]*>|([^`]*))`|\[([^\]]+)\]\([^)]*\)|\*")
+PAGE = re.compile(r"\{doc\}`([^`<]+)`")
+WORK = re.compile(r"\{cite:?t?\}`(\w+?)(\d+)`")
 
 #: Characters of an excerpt, which ends with a word.
 EXCERPT = 200
+
+
+def _named(path: Path) -> str:
+    """The text of a page, with the titles of other pages and the authors of works in place of their names."""
+
+    def title(page: re.Match[str]) -> str:
+        other = (path.parent / page[1]).with_suffix(".md")
+        found = TITLE.search(other.read_text("utf-8")) if other.exists() else None
+        return found[0][2:].strip() if found else page[0]
+
+    text = PAGE.sub(title, path.read_text("utf-8"))
+    return WORK.sub(lambda work: " ".join([*re.findall("[A-Z][a-z]+", work[1]), work[2]]), text)
 
 
 def excerpts(source: Path) -> dict[str, str]:
@@ -115,7 +129,7 @@ def excerpts(source: Path) -> dict[str, str]:
     found = {}
     for path in sorted(source.rglob("*.md")):
         name = path.relative_to(source).with_suffix("").as_posix()
-        below = TITLE.split(path.read_text("utf-8"), maxsplit=1)[1:]
+        below = TITLE.split(_named(path), maxsplit=1)[1:]
         blocks = (
             re.split(r"\n{2,}", FENCED.sub("", below[0]).strip())
             if below and not name.startswith(("_build", "generated"))

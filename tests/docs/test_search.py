@@ -132,6 +132,8 @@ def test_each_page_has_an_excerpt_of_text_for_a_site_that_is_read_from_disk(buil
     assert max(map(len, found.values())) <= 200
     assert sum(map(len, found.values())) < 20_000
     assert [name for name, text in found.items() if re.search(r"[`*]|\{\w+\}|\]\(|DOES IT", text)] == []
+    assert found["references"].startswith("The paper under study is Bayada Sabil Sassi 2008; equation")
+    assert found["energy"].startswith("The proof of The theorem, proved again on a mesh measures")
     assert found["examples/prediction"].startswith(
         "Before a run a bound guarantees that each step reduces the error by"
     )
