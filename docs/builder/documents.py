@@ -83,6 +83,6 @@ def _rows(cls: type, above: str = "", default: str = "") -> Iterator[tuple[str, 
 
 def _default(one: Entry) -> str:
     """The default of a key in words."""
-    if one.shown or one.default in (REQUIRED, EMPTY, None, ()) or callable(one.default):
+    if one.shown or one.default in (REQUIRED, EMPTY, None, (), {}) or callable(one.default):
         return one.shown
     return f"`{value(plain(one.default))}`"
