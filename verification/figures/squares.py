@@ -78,7 +78,8 @@ def _draw(ax: Axes, C0: Decimal, P: Decimal, D: Decimal, Q: Decimal) -> None:
     ax.axhline(0, color="0.3", linewidth=0.8)
     for name, theta, side in marks:
         ax.axvline(theta, color="0.3", linestyle=":", linewidth=0.9)
-        ax.text(theta, 1.0, name, transform=ax.get_xaxis_transform(), ha=side, va="top")
+        height = 0.5 if side == "left" else 1.0  # right of C_1 the curve of h_1 takes the room above
+        ax.text(theta, height, name, transform=ax.get_xaxis_transform(), ha=side, va="top")
     ax.set(xlim=(0, right), ylim=(max(1.3 * lowest, -1.0), highest), xlabel=THETA)
     ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.ticklabel_format(axis="x", scilimits=(-2, 3))
