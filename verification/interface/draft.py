@@ -25,7 +25,8 @@ PRESS = 0.005
 
 #: Parts of the text.
 HEAD = """\
-# A draft of a problem file: choose what the comments name, and take away the # before the lines that you want.
+# A draft of a problem file: choose what the comments name, and take away the #
+# before the lines that you want.
 # A path of a mesh is relative to the folder of this file.
 title = {title}
 plane = "{plane}"
