@@ -16,7 +16,7 @@ bars = vf.example("two-bars")
 rho = vf.measure(bars).rho_max.value
 thetas = [0.05, 0.1, 0.15, 0.2, 0.3, 0.35, 0.4, 0.45]
 rates = [vf.run(bars, theta=theta).observed_rate.value for theta in thetas]
-line = np.linspace(0, 0.5)
+line = np.linspace(0, 0.5, 51)
 figure = Figure(layout="constrained")
 ax = figure.subplots()
 ax.plot(line, abs(1 - line * (1 + rho)), label="|1 - theta (1 + rho)|")
