@@ -37,6 +37,7 @@ def test_each_block_of_the_page_is_what_the_command_prints_for_help(pages, monke
         assert main([*typed.split(), "--help"]) == 0
         assert capsys.readouterr().out == f"{shown}\n"
         assert max(map(len, shown.splitlines())) <= 80
+        assert "\b" not in shown
 
 
 def test_a_command_without_a_page_or_a_schema_is_found(pages):

@@ -82,6 +82,7 @@ def sweep(
       theta = { start = 0.05, stop = 0.95, step = 0.05 }
       friction = [0.1, 0.2, 0.4]
       young = [[7.0e4, 2.0e4], [2.0e4, 7.0e4]]
+
     \b
     Examples:
       ndtheory sweep grid.toml --jobs 2
