@@ -64,7 +64,7 @@ TASKS = {
 def summary(one: Any) -> str:
     """First sentence of a docstring as Markdown, with the targets of its roles as code."""
     text = (inspect.getdoc(one) or "").partition("\n\n")[0].replace("\n", " ")
-    return re.sub(r":\w+:`~?([^`]+)`", r"`\1`", text)
+    return _with_code(text)
 
 
 def place(one: Any) -> str:
@@ -115,7 +115,12 @@ def modules(root: Path = ROOT) -> dict[str, Path]:
 
 def sentence(path: Path) -> str:
     """First line of a module's docstring, empty where it has none."""
-    return (ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "").partition("\n")[0]
+    return _with_code((ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "").partition("\n")[0])
+
+
+def _with_code(text: str) -> str:
+    """A text with the targets of its roles as code."""
+    return re.sub(r":\w+:`~?([^`]+)`", r"`\1`", text)
 
 
 def pages(found: dict[str, Path]) -> dict[str, str]:

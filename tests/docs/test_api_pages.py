@@ -33,7 +33,7 @@ def test_the_list_has_each_module_once_with_its_first_sentence(builder):
     lines = builder.api.index(found).splitlines()
     rows = [line for line in lines if line.startswith("| {doc}")]
     assert sorted(row.split("`")[1].split(" ")[0] for row in rows) == sorted(found)
-    assert [row for row in rows if row.endswith("|  |")] == []
+    assert [row for row in rows if row.endswith("|  |") or ":`" in row] == []
     assert "| {doc}`ndtheory.bounds <api/ndtheory.bounds>` | " in "\n".join(rows)
 
 
