@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, eigvalsh, solve_triangular
-from scipy.optimize import minimize_scalar
 
 from fem1d2d.mesh import Floats
 from ndtheory.continuum.circle import disk
@@ -22,6 +21,7 @@ from verification.constants import Measured
 from verification.dense import symmetric
 from verification.free_norm.circle import ABOVE, Circle, Circles
 from verification.free_norm.radius import radius
+from verification.free_norm.search import best_up_to
 from verification.interface.pair import ContactPair
 from verification.machine.progress import Progress, silent
 from verification.machine.threads import one_thread
@@ -134,9 +134,7 @@ class FreeNorm:
     def best_theta(self, largest: float) -> Proved | None:
         """The proof for the theta whose factor is least, below the largest one that contracts."""
         factor = lambda theta: 1.0 if (proof := self.factor(theta, ROUGH)) is None else proof.factor
-        near = min(THETA, largest / 10)
-        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": near})
-        return self.factor(min(float(f"{found.x:.3g}"), largest))
+        return self.factor(best_up_to(largest, factor, THETA))
 
     def _inside(
         self, theta: float, border: tuple[float, Circle | None], share: float, at: Callable[[float], Circle | None]

@@ -125,9 +125,8 @@ class Search:
 
     def best_theta(self, k: float, largest: float) -> tuple[float, float]:
         """The theta <= ``largest`` with the least factor at friction k, to 0.005 in three digits, and that factor."""
-        factor, near = lambda theta: self.factor(theta, k) or 1.0, min(5e-3, largest / 10)
-        found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options={"xatol": near})
-        theta = min(float(f"{found.x:.3g}"), largest)
+        factor = lambda theta: self.factor(theta, k) or 1.0
+        theta = best_up_to(largest, factor, 5e-3)
         return theta, factor(theta)
 
     def energy_factor(self, theta: float, k: float) -> tuple[float, Multipliers, float]:
@@ -226,6 +225,13 @@ def _matrices(form: Symmetric) -> Floats:
     """Symmetric matrices of two rows, one for each wave number."""
     along, across, mixed = form
     return np.array([[along, mixed], [mixed, across]]).transpose(2, 0, 1)
+
+
+def best_up_to(largest: float, factor: Callable[[float], float], near: float) -> float:
+    """The theta <= ``largest`` with the least factor, in three digits, to ``near`` or a tenth of ``largest``."""
+    options = {"xatol": min(near, largest / 10)}
+    found = minimize_scalar(factor, bounds=(0.0, largest), method="bounded", options=options)
+    return min(float(f"{found.x:.3g}"), largest)
 
 
 def drawn_in(
