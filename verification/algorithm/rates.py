@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -213,10 +214,10 @@ def largest_step_ratio(
     )
 
 
-def steps(rate: float, tolerance: float = 1e-9, rest: float | None = None) -> int | None:
+def steps(rate: float | Fraction, tolerance: float = 1e-9, rest: float | None = None) -> int | None:
     """Number of steps of a rate to a tolerance; None where no number is enough, or no double is so large.
 
-    ``rest`` is 1 - rate, where it is known without cancellation.
+    ``rest`` is 1 - rate, where it is known without the cancellation that a rate near 1 in doubles has.
 
     >>> steps(0.1, 1e-3), steps(1.0, rest=1e-20) > 2e21, steps(1.0)
     (3, True, None)

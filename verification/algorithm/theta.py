@@ -11,6 +11,7 @@ from ndtheory import EnergyBounds, evaluate_energy, exact
 from ndtheory.energy_norms import predicted_factor, predicted_theta
 from ndtheory.keys import Part, key
 from ndtheory.number import Numeric
+from verification.algorithm.rates import steps
 from verification.algorithm.relaxation import Rule, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
@@ -110,7 +111,8 @@ def automatic(energy: EnergyBounds, outside: Sequence[str] = (), tolerance: floa
         nothing = outside[0] if outside else "the energy bound is 1 or more for every theta"
         return Choice(theta=predicted, source="predicted", rho=rho, why=f"no theta is proved: {nothing}")
     proved = below_one(energy.theta_proved)
-    of_proved, of_predicted = (predicted_steps(theta, rho, tolerance) for theta in (proved, predicted))
+    needs = lambda theta: steps(predicted_factor(theta, Fraction(rho)), tolerance) or math.inf
+    of_proved, of_predicted = needs(proved), needs(predicted)
     if of_proved > TOO_SLOW * of_predicted:
         why = f"{of_predicted} steps predicted, against {of_proved} at the proved theta {float(proved):.4g}"
         return Choice(theta=predicted, source="predicted", rho=rho, why=why)
@@ -129,10 +131,3 @@ def by_prediction(rho: float, why: str) -> Choice:
 def below_one(theta: float) -> Fraction:
     """Return a theta chosen for the user, below 1."""
     return exact(min(theta, CLOSEST_TO_ONE))
-
-
-def predicted_steps(theta: Fraction, rho: float, tolerance: float) -> int:
-    """Return the number of steps that the predicted factor needs from 1 down to a tolerance."""
-    # of 1 - factor, as a small theta is lost in the factor itself
-    gain = float(1 - predicted_factor(theta, Fraction(rho)))
-    return math.ceil(math.log(tolerance) / math.log1p(-gain))
