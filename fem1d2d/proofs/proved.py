@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import LinAlgError, eigh
 
 from fem1d2d.mesh import Floats, Ints
+from fem1d2d.pencil import largest
 from fem1d2d.proofs.enclosed import LARGEST, SMALLEST, Enclosed
 from fem1d2d.proofs.loewner import Elimination
 
@@ -57,10 +57,15 @@ def enclose_largest(
     True
     """
     X, Y = above
-    found = _dense_guess(X, Y) if guess is None else (guess, None)
-    if found is None or not SMALLEST <= found[0] <= LARGEST:
+    value, x = guess, None
+    if value is None:
+        try:
+            found = largest(X.middle, Y.middle)
+        except (np.linalg.LinAlgError, ValueError):  # Y not definite, not finite
+            return None, None
+        value, x = found.value, found.vector
+    if not SMALLEST <= value <= LARGEST:
         return None, None
-    value, x = found
     first = Elimination(Y.plus(-1.0, X, factor=(1 + NEAR) * value), order=order)
     if first.plain is None:
         return None if x is None else _quotient(below or above, x), None
@@ -77,17 +82,6 @@ def enclose_largest(
             return low, r
         distance *= FARTHER
     return low, None
-
-
-def _dense_guess(X: Enclosed, Y: Enclosed) -> tuple[float, Floats | None] | None:
-    n = X.middle.shape[0]
-    try:
-        values, vectors = eigh(X.middle, Y.middle, subset_by_index=[n - 1, n - 1], driver="gvx")
-        if not len(values):  # LAPACK's subsets miss an eigenvalue of high multiplicity
-            values, vectors = eigh(X.middle, Y.middle, driver="gvd")
-    except (LinAlgError, ValueError):  # Y not definite, not finite
-        return None
-    return float(values[-1]), vectors[:, -1]
 
 
 def _quotient(pencil: Pencil, x: Floats) -> float | None:
