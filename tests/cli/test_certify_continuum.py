@@ -174,6 +174,14 @@ def test_without_friction_the_mirror_image_proves_the_classical_rate(call, write
     assert document["factor_proved"]["hi"] == pytest.approx(1 / 8)
 
 
+def test_a_factor_below_1_is_never_shown_as_1_and_a_small_theta_not_as_0(call, write):
+    """Without friction the factor of a stiff contact body is 1 - theta up to theta = 1.3998..e-5."""
+    stiff = write({"contact.friction": "0", "contact.radius": None, "body2.young": "1e10"})
+    said = " ".join(call("certify", "--continuum", stiff, "--theta", "1e-5").out.split())
+    assert "0 < theta < 1.399e-05; the best proved theta is 1.399e-05, factor <= 1 - 1.399e-05." in said
+    assert "theta = 1e-05: factor <= 1 - 9.999e-06, guaranteed." in said
+
+
 @pytest.mark.parametrize(
     ("edits", "key", "needed"),
     [

@@ -98,7 +98,9 @@ _at_least = partial(_at_most, up=False)
 
 
 def _few(value: float, up: bool) -> str:
-    return f"{float(directed(value, 4, up=up)):.4g}"
+    """A bound in four figures; one below 1 that would be rounded to 1 as its distance from 1."""
+    few = float(directed(value, 4, up=up))
+    return f"1 - {_few(1 - value, False)}" if value < 1 <= few else f"{few:.4g}"
 
 
 @registry.sections.register
@@ -153,8 +155,8 @@ def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list
         lo, hi = document["interval"][0], "1"
         if found.energy.interval != (0.0, 1.0):
             hi = _few(document["theta_max_proved"]["lo"], False)
-        best = f"{document['theta_proved']:.3f}, factor {_at_most(document['factor_proved'])}"
-        said.append(f"At {name} = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.")
+        best = f"{_few(document['theta_proved'], False)}, factor {_at_most(document['factor_proved'])}"
+        said.append(f"At {name} = {k:g}: {_few(lo, True)} < theta < {hi}; the best proved theta is {best}.")
         if document["factor"] is not None:
             said.append(f"theta = {document['theta']:g}: factor {_at_most(document['factor'])}, guaranteed.")
         elif document["theta"] is not None:
@@ -173,7 +175,7 @@ def _in_a_free_norm(name: str, k: float, free: Mapping[str, Any]) -> list[str]:
         here = f"There, at {name} = {k:g}: every theta <= {_few(top['lo'], False)}"
         here += "" if factor is None else f"; the file's theta by a factor {_at_most(factor)}"
         if free["theta_best"] is not None:
-            here += f"; theta = {free['theta_best']:.3f} by {_at_most(free['factor_best'])}"
+            here += f"; theta = {figures(free['theta_best'])} by {_at_most(free['factor_best'])}"
         said.append(f"{here}, guaranteed.")
     return said
 
