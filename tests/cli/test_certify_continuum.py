@@ -1,10 +1,15 @@
 """ndtheory certify --continuum: what it proves, what it refuses, what it says it cannot prove."""
 
+from fractions import Fraction
+
 import pytest
 from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory import evaluate_energy
+from ndtheory.continuum.rectangles import lower
+from verification.certificate import continuum
+from verification.free_norm.rectangles import RectangleNorm
 
 pytestmark = pytest.mark.usefixtures("known_continuum")
 
@@ -172,6 +177,19 @@ def test_without_friction_the_mirror_image_proves_the_classical_rate(call, write
     ).document
     assert document["constants"]["rho_normal"]["hi"] == pytest.approx(2 / 7)
     assert document["factor_proved"]["hi"] == pytest.approx(1 / 8)
+
+
+@pytest.mark.parametrize(
+    ("theta", "verdict"), [("0.59", "contraction"), ("0.61", "no conclusion"), ('"auto"', "contraction")]
+)
+def test_every_theta_up_to_the_proved_one_contracts_without_a_factor(theta, verdict, call, write, monkeypatch):
+    """The norm of a theta serves every smaller one; the search may still prove no factor there."""
+    most = RectangleNorm(theta_max=lower(Fraction("0.6")))
+    monkeypatch.setattr(continuum, "rectangle_norm", lambda *given: most)
+    path = write({"contact.friction": "0.4", "contact.radius": "0.1", "iteration.theta": theta})
+    answer = call("certify", "--continuum", path, "--json")
+    assert (answer.document["interval"], answer.document["verdict"]) == (None, verdict)
+    assert answer.status == (verdict != "contraction")
 
 
 def test_a_factor_below_1_is_never_shown_as_1_and_a_small_theta_not_as_0(call, write):

@@ -250,7 +250,8 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     inside = None if energy is None else energy.interval
     theta = None if energy is None else energy.theta
     proved = inside is not None if energy is None or theta is None else energy.verdict == "contraction"
-    proved = proved or (free.theta_best if given == "auto" else free.factor) is not None
+    most = free.theta_max.value if free.theta_max else 0.0  # every theta up to it contracts
+    proved = proved or (bool(most) if given == "auto" else given <= most or free.factor is not None)
     best = None if energy is None else energy.theta_proved
 
     def end(name: str, of: Callable[[Fraction], Number], side: str, times: Fraction = Fraction(1)) -> Number | None:

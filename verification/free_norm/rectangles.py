@@ -129,6 +129,7 @@ def rectangle_norm(
     known = {name: value for name, value in found.items() if getattr(value, "level", "") != "float"}
     if "factor_best" not in known:
         known.pop("theta_best", None)
-    why = constants.reason.get("cut_off", "at this friction no multipliers prove contraction")
+    none = "at this friction no multipliers prove contraction"
+    why = constants.reason.get("cut_off", "the search proves none" if "theta_max" in known else none)
     reason = dict.fromkeys(names, why) | ({"factor": "the file gives no theta"} if theta is None else {})
     return RectangleNorm(**known, reason={name: text for name, text in reason.items() if name not in known})

@@ -115,7 +115,8 @@ class Search:
         """The least q for which T_theta contracts by q at friction k, 0 < theta <= 1; None where there is none."""
         missing = lambda q: self.allowed(disk(theta, q)).friction - k
         near = min(NEAR, theta / 1000)
-        return _least(missing, 1 - theta + near, 1.0, near)
+        least = 1 - theta + near
+        return _least(missing, least, 1.0, near) if least > 1 - theta else None  # else lost in rounding
 
     def largest_theta(self, k: float) -> float | None:
         """The theta <= 1 below which every T_theta contracts at friction k; None where no theta does."""

@@ -51,6 +51,11 @@ def test_no_factor_in_the_norm_of_the_paper_is_below_the_one_in_a_free_norm(nu, 
         assert free is None or free <= energy * (1 + 1e-5)
 
 
+def test_a_theta_that_rounding_loses_beside_1_has_no_factor():
+    assert 1 - 1e-12 < search().factor(1e-12, 0.2) < 1
+    assert search().factor(1e-16, 0.2) is None
+
+
 def test_roles_exchanged_need_a_small_theta():
     exchanged = search(young=(20000, 70000))
     assert exchanged.factor(0.1, 0.2) == pytest.approx(0.913, rel=3e-3)
