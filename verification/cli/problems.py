@@ -50,12 +50,10 @@ class Examples(Document):
     )
 
 
-def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    return [name for name in examples() if name.startswith(begun)]
-
-
 @cli.command()
-@click.argument("name", required=False, shell_complete=_names)
+@click.argument(
+    "name", required=False, shell_complete=lambda at, key, begun: [one for one in examples() if one.startswith(begun)]
+)
 @click.option(
     "--inputs",
     type=PATH,

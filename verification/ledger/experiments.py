@@ -63,16 +63,14 @@ class Section6:
 
         If no reading shows it on the meshes of the level, those that are undecided get all meshes until one shows it.
         """
-        outcome = self.zones if claim is CLAIMS["fig5"] else lambda reading: self._steps(claim, reading)
+        steps = lambda reading: judged(claim, self.runs(reading), self._meshes)
+        outcome = self.zones if claim is CLAIMS["fig5"] else steps
         outcomes = {reading: outcome(reading) for reading in self.readings}
         for reading in [reading for reading, seen in outcomes.items() if seen.holds is None and not seen.refused]:
             if any(seen.holds for seen in outcomes.values()):
                 break
             outcomes[reading] = judged(claim, self.runs(reading))
         return Result(figure=claim.name, outcomes=tuple(outcomes.values()))
-
-    def _steps(self, claim: Claim, reading: ModelReading) -> Outcome:
-        return judged(claim, self.runs(reading), self._meshes)
 
     @property
     def compared(self) -> list[ModelReading]:

@@ -46,13 +46,8 @@ def takes_theta(relaxation: Any) -> bool:
 
 
 def read_theta(value: Any) -> Theta:
-    """Read a relaxation factor, or "auto".
-
-    Raises
-    ------
-    HypothesisError
-    """
-    if value == "auto":
+    """Read a relaxation factor, or "auto"; HypothesisError for anything else."""
+    if isinstance(value, str) and value == "auto":
         return "auto"
     try:
         return relaxation_factor(value)
@@ -96,7 +91,7 @@ def listed(read: Callable[[Any], Fraction]) -> Callable[[Any], tuple[Fraction, .
     """Return a reader of a list of two numbers or more."""
 
     def read_all(value: Any) -> tuple[Fraction, ...]:
-        if not isinstance(value, (list, tuple)) or len(value) < 2:
+        if not isinstance(value, list) or len(value) < 2:
             raise Unfit("needed a list of two numbers or more")
         return tuple(map(read, value))
 
@@ -164,7 +159,7 @@ def by_name(value: Any, at: At) -> dict[str, tuple[Fraction, ...]]:
 
 def polyline(value: Any, at: At) -> tuple[tuple[Fraction, ...], ...]:
     """Read the points of a line, each with two coordinates, of which neighbours differ."""
-    if not isinstance(value, (list, tuple)) or len(value) < 2:
+    if not isinstance(value, list) or len(value) < 2:
         raise Unfit("needed a list of two points or more, as [[0.0, 0.0], [1.0, 0.2]]")
     found = tuple(place(point, at) for point in value)
     if any(list(map(float, one)) == list(map(float, other)) for one, other in pairwise(found)):
@@ -230,7 +225,7 @@ def two_bodies(value: Any, at: At) -> tuple[int, int]:
 
 def roles(value: Any, at: At) -> tuple[int, ...]:
     """Read the bodies with the Neumann problem: of each contact exactly one."""
-    if not isinstance(value, (list, tuple)) or len(set(map(str, value))) < len(value):
+    if not isinstance(value, list) or len(set(map(str, value))) < len(value):
         raise Unfit("needed a list of different numbers of bodies, as [1, 3]")
     chosen = {choice(*at["numbers"])(i) for i in value}
     for one, other in at["touching"]:
@@ -241,7 +236,7 @@ def roles(value: Any, at: At) -> tuple[int, ...]:
 
 
 def _all_are(kind: type, value: Any) -> bool:
-    return isinstance(value, (list, tuple)) and all(isinstance(each, kind) for each in value)
+    return isinstance(value, list) and all(isinstance(each, kind) for each in value)
 
 
 def tables_of(top: TomlTable, name: str, needed: str = "") -> Callable[[Any], list[TomlTable]]:

@@ -56,7 +56,7 @@ class Problem(ProblemSpec):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "<dict>") -> Problem:
-        """Validate a nested dictionary with the keys of the problem file.
+        """Validate a nested dictionary with the keys of the problem file; numbers and arrays may be those of numpy.
 
         Raises
         ------

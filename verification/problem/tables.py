@@ -47,7 +47,7 @@ class ProblemError(ValueError):
     """
 
     def __init__(self, file: str, key: str, value: object, needed: str) -> None:
-        received = "" if value is None else f" = {show(value)}"
+        received = "" if value is None else f" = {show(plain(value))}"
         where = file if len(file) <= LONGEST_PATH else "..." + file[3 - LONGEST_PATH :]  # its end names the file
         message = ": ".join(part for part in (where, f"{short(key)}{received}", short(needed, 400)) if part)
         super().__init__(printable(message))  # one line, whatever was received
@@ -209,6 +209,13 @@ def ends(value: Any) -> tuple[Fraction, Fraction]:
     return a, b
 
 
+def plain(value: Any) -> Any:
+    """Return a sequence as a list, inside it too, and an array or a number of numpy as lists and numbers of Python."""
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 class TomlTable:
     """A table of which every key is taken once; any key left over is an error.
 
@@ -252,7 +259,7 @@ class TomlTable:
             result: V = default
             return result
         try:
-            return read(value)
+            return read(plain(value))
         except Unfit as error:
             raise self.refuse(name, value, str(error)) from None
 

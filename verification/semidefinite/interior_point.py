@@ -247,10 +247,7 @@ class Cones:
 def solve(program: Program) -> Optimum:
     """The least s (or the largest), with its multipliers and moments.
 
-    Raises
-    ------
-    LMIError
-        The program's own start is not strictly feasible in floating point.
+    LMIError where the program's own start is not strictly feasible in floating point.
     """
     maximise = program.highest is not None
     lengths = [np.linalg.norm(rows, axis=1) for rows in (program.left, program.right)]

@@ -16,10 +16,7 @@ from verification.semidefinite.interior_point import Optimum, Program
 def solve(program: Program, *, solver: str = cp.CLARABEL, **options: Any) -> Optimum:
     """The answer of a conic solver of cvxpy, by its name there; its work grows with the sixth power of the rows.
 
-    Raises
-    ------
-    LMIError
-        The solver gave up.
+    LMIError where the solver gave up.
     """
     s, size = cp.Variable(), np.linalg.norm(program.left, axis=1) * np.linalg.norm(program.right, axis=1)
     size = size if program.tie is None else size @ program.tie

@@ -1,8 +1,10 @@
 """Messages show values as a user would type them."""
 
+from copy import deepcopy
 from decimal import Decimal
 from fractions import Fraction
 
+import numpy as np
 import pytest
 from problem_list import blocks
 
@@ -75,3 +77,30 @@ def test_supports_that_change_in_a_history_are_refused_with_free_and_the_remedy(
 def test_a_hypothesis_shows_numbers_in_the_same_way():
     with pytest.raises(HypothesisError, match=r"^theta = 1\.3: needed"):
         vf.run(vf.Problem.from_dict(blocks()), theta=1 + THREE_TENTHS)
+
+
+def test_numbers_and_arrays_of_numpy_are_numbers_and_lists():
+    keys = {"cells": ((4, 4), (4, 4)), "contact": {"friction": "0.2", "radius": 1}, "iteration": {"theta": 0.5}}
+    data = blocks(**keys, body2={"prescribed": {"top": [0, -0.25]}})
+    given = deepcopy(data)
+    for name in ("body1", "body2"):
+        of = given[name]
+        given[name] = of | {"x": np.array(of["x"]), "cells": [np.int64(4), np.int32(4)], "young": np.int64(of["young"])}
+    given["body2"]["prescribed"] = {"top": np.array([0, -0.25])}
+    given["contact"]["radius"] = np.array(1)
+    given["iteration"]["theta"] = np.float32(0.5)
+    assert vf.Problem.from_dict(given) == vf.Problem.from_dict(data)
+
+
+@pytest.mark.parametrize(("table", "key"), [("iteration", "theta"), ("contact", "friction"), ("body1", "poisson")])
+def test_an_array_in_place_of_a_number_is_refused_as_the_list_is(table, key):
+    data = blocks()
+    refused = []
+    for value in (np.array([0.5, 0.25]), [0.5, 0.25]):
+        tables = {**data, table: {**data.get(table, {}), key: value}}
+        with pytest.raises(vf.ProblemError, match=rf"{table}.{key} = \[0.5, 0.25\]: needed ") as error:
+            vf.Problem.from_dict(tables)
+        refused.append(str(error.value))
+    assert refused[0] == refused[1]
+    with pytest.raises(HypothesisError, match="needed a number with 0 < theta < 1"):
+        vf.run(vf.Problem.from_dict(data), theta=np.array([0.5, 0.25]))
