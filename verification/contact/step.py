@@ -97,10 +97,11 @@ class ContactStep:
         self._model: ContactModel | None = None
         self._first = self._pattern = Pattern.sticking(len(S) - tangential, tangential)
         self._loads, self._patterns, self._solved = np.zeros((KEPT, len(S))), [self._first] * KEPT, 0
+        self._steady = False  # whether the last step kept the pattern of the one before
 
     def restart(self) -> None:
         """Forget the last pattern, as for the first step of a run; no digit depends on what else is kept."""
-        self._pattern = self._first
+        self._pattern, self._steady = self._first, False
 
     def solve(self, q: Floats, bound: Floats) -> ContactSolution:
         """Solve and certify.
@@ -113,7 +114,9 @@ class ContactStep:
             Without a minimiser, or a certificate; with too many unknowns for the program that was asked for.
         """
         start, found = self._pattern, None
-        if self._solver != "cvxpy":
+        if self._steady and self._solver != "cvxpy":
+            found = self._by_active_set(q, bound, start, "active-set")
+        if found is None and self._solver != "cvxpy":
             hint = self._nearest(q)
             if hint != start:
                 found = self._by_active_set(q, bound, start, "active-set", hint)
@@ -135,7 +138,7 @@ class ContactStep:
         if found is None:
             why = f": {self._near} is too near 1/2 for doubles" if self._near else ""
             raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}{why}{too_many}")
-        self._pattern = found.pattern
+        self._pattern, self._steady = found.pattern, found.pattern == start
         place = self._solved % KEPT
         self._loads[place], self._patterns[place], self._solved = q, found.pattern, self._solved + 1
         return found
