@@ -95,13 +95,13 @@ class ContactStep:
         self._active = ActiveSet(S, free, tangential, self._motions, systems)
         self._certificate = KKTCertificate(S, free)
         self._model: ContactModel | None = None
-        self._first = self._pattern = Pattern.sticking(len(S) - tangential, tangential)
+        self._first = Pattern.sticking(len(S) - tangential, tangential)
         self._loads, self._patterns, self._solved = np.zeros((KEPT, len(S))), [self._first] * KEPT, 0
-        self._steady = False  # whether the last step kept the pattern of the one before
+        self.restart()
 
     def restart(self) -> None:
         """Forget the last pattern, as for the first step of a run; no digit depends on what else is kept."""
-        self._pattern, self._steady = self._first, False
+        self._pattern, self._steady = self._first, False  # steady: the last step kept the pattern of the one before
 
     def solve(self, q: Floats, bound: Floats) -> ContactSolution:
         """Solve and certify.
@@ -114,13 +114,9 @@ class ContactStep:
             Without a minimiser, or a certificate; with too many unknowns for the program that was asked for.
         """
         start, found = self._pattern, None
-        if self._steady and self._solver != "cvxpy":
-            found = self._by_active_set(q, bound, start, "active-set")
-        if found is None and self._solver != "cvxpy":
-            hint = self._nearest(q)
-            if hint != start:
-                found = self._by_active_set(q, bound, start, "active-set", hint)
-            found = found or self._by_active_set(q, bound, start, "active-set")
+        if self._solver != "cvxpy":
+            close = lambda *hint: self._by_active_set(q, bound, start, "active-set", *hint)
+            found = (self._steady and close()) or close(self._nearest(q)) or close()
         if found is None and (way := way_out(self._motions, q, bound)):
             raise NoMinimiser(f"step II has no minimiser: the loads move {self._body} {way}")
         too_many = ""
@@ -133,8 +129,7 @@ class ContactStep:
                 answer, too_many = None, f"; {error}"
             found = None if answer is None else self._by_active_set(q, bound, answer.pattern, "cvxpy")
         if found is None:
-            sticking = self._first
-            found = self._by_active_set(q, bound, sticking, "active-set") or self._by_a_guess(q, bound, sticking)
+            found = self._by_active_set(q, bound, self._first, "active-set") or self._by_a_guess(q, bound)
         if found is None:
             why = f": {self._near} is too near 1/2 for doubles" if self._near else ""
             raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}{why}{too_many}")
@@ -161,16 +156,17 @@ class ContactStep:
         closed = self._active.solve(q, bound, start, hint)
         return None if closed is None else self._certified(q, bound, closed, solver)
 
-    def _by_a_guess(self, q: Floats, bound: Floats, start: Pattern) -> ContactSolution | None:
+    def _by_a_guess(self, q: Floats, bound: Floats) -> ContactSolution | None:
         """Return the best of the guesses among which the active set cycles, if that one is certified.
 
         Signs are read with a slack of 1e-14 of the largest force.  Where forces, or jumps times stiffness, are hardly
         further than that from where a condition changes, as with a friction bound of 1e-13, the nodes may turn each
         other for ever, though each of the guesses meets all conditions to a share of the tolerance.
         """
-        guesses = (self._certified(q, bound, guess, "active-set") for guess in self._active.repeated(q, bound, start))
-        certified = (found for found in guesses if found is not None)
-        return min(certified, key=lambda found: found.kkt.residual, default=None)
+        guesses = (
+            self._certified(q, bound, guess, "active-set") for guess in self._active.repeated(q, bound, self._first)
+        )
+        return min(filter(None, guesses), key=lambda found: found.kkt.residual, default=None)
 
     def _certified(
         self, q: Floats, bound: Floats, guess: tuple[Floats, Floats, Pattern], solver: Literal["cvxpy", "active-set"]

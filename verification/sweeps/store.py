@@ -144,7 +144,7 @@ def _text(name: str, value: Any, source: str) -> str:
             raise ProblemError(source, "rule", rule.name, NEEDED.format("rule"))
         return rule.name
     if isinstance(value, tuple):
-        return ",".join(exactly(v) for v in value)
+        return ",".join(map(exactly, value))
     return exactly(value) if isinstance(value, Fraction) else str(value)
 
 
@@ -172,7 +172,7 @@ def _of_pair(pair: ContactPair) -> dict[str, Any]:
         arrays |= {f"{name}.{part}": getattr(side, attribute) for part, attribute in ARRAYS.items()}
         arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}
     profile = interface.profile
-    varies = {} if profile is None else {"profile": [[exactly(v) for v in column] for column in vars(profile).values()]}
+    varies = {} if profile is None else {"profile": [[*map(exactly, column)] for column in vars(profile).values()]}
     return varies | {
         "matrices": {name: None if array is None else _content(array) for name, array in arrays.items()},
         "upward": [pair.contact.upward, pair.neumann.upward],
@@ -236,8 +236,11 @@ class Store:
                 self._open()
                 damaged = self._read(fresh, retry)
                 others: Counter[str] = Counter()
+                made = self._file.execute("SELECT version, identity FROM studies").fetchall()
                 for numerics in range(1, NUMERICS):
-                    others.update(self._count(_keys(shared | {"numerics": numerics}, grid, start.source)))
+                    other = shared | {"numerics": numerics}
+                    if any(_identity(version, other) == identity for version, identity in made):
+                        others.update(self._count(_keys(other, grid, start.source)))
                 self._study = self._begin(shared, problem_of(start))
         except BaseException:
             self._file.close()
@@ -309,7 +312,7 @@ class Store:
 
     def _begin(self, shared: dict[str, Any], problem: Problem | None) -> int:
         """Return the number of a study, the origin of rows, with the problem as its file has it."""
-        study = hashlib.sha256(json.dumps({"made by": __version__} | shared).encode("ascii")).hexdigest()
+        study = _identity(__version__, shared)
         text = None if problem is None else json.dumps(problem.to_dict())
         with self._transaction():
             self._file.execute(
@@ -367,6 +370,10 @@ class Store:
                     f"; the {self.kept} rows that it took before are in it, and the same command goes on from there"
                 )
             raise StoreError(str(self.path), "", None, words) from None
+
+
+def _identity(version: str, shared: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps({"made by": version} | shared).encode("ascii")).hexdigest()
 
 
 def _row(key: object, outcome: object, text: object, crc: object) -> Row | None:
