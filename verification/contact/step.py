@@ -116,7 +116,10 @@ class ContactStep:
         start, found = self._pattern, None
         if self._solver != "cvxpy":
             close = lambda *hint: self._by_active_set(q, bound, start, "active-set", *hint)
-            found = (self._steady and close()) or close(self._nearest(q)) or close()
+            found = close() if self._steady else None
+            hint = start if found else self._nearest(q)
+            found = close(hint) if hint != start else found
+            found = found if found or self._steady else close()
         if found is None and (way := way_out(self._motions, q, bound)):
             raise NoMinimiser(f"step II has no minimiser: the loads move {self._body} {way}")
         too_many = ""
@@ -127,7 +130,7 @@ class ContactStep:
                 if self._solver == "cvxpy":
                     raise
                 answer, too_many = None, f"; {error}"
-            found = None if answer is None else self._by_active_set(q, bound, answer.pattern, "cvxpy")
+            found = answer and self._by_active_set(q, bound, answer.pattern, "cvxpy")
         if found is None:
             found = self._by_active_set(q, bound, self._first, "active-set") or self._by_a_guess(q, bound)
         if found is None:
@@ -140,10 +143,8 @@ class ContactStep:
 
     def _nearest(self, q: Floats) -> Pattern:
         """Return the pattern of the step whose loads were nearest to these: a run comes back to where it was."""
-        if not self._solved:
-            return self._pattern
-        off = self._loads[: self._solved] - q
-        return self._patterns[int(np.argmin(np.einsum("ij,ij->i", off, off)))]
+        off = self._loads[: self._solved or 1] - q
+        return self._patterns[np.argmin(np.einsum("ij,ij->i", off, off))]
 
     def _by_active_set(
         self,
@@ -154,7 +155,7 @@ class ContactStep:
         hint: Pattern | None = None,
     ) -> ContactSolution | None:
         closed = self._active.solve(q, bound, start, hint)
-        return None if closed is None else self._certified(q, bound, closed, solver)
+        return closed and self._certified(q, bound, closed, solver)
 
     def _by_a_guess(self, q: Floats, bound: Floats) -> ContactSolution | None:
         """Return the best of the guesses among which the active set cycles, if that one is certified.
@@ -173,13 +174,12 @@ class ContactStep:
     ) -> ContactSolution | None:
         v, force, pattern = guess
         kkt = self._certificate.measure(q, bound, v, force)
-        if not kkt.residual <= TOLERANCE:
-            return None
-        return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
+        solution = ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
+        return solution if kkt.residual <= TOLERANCE else None
 
     def _of_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
         """Return the answer of the convex program itself, or None where it gives none; ContactError if too large."""
-        if (unknowns := int(self._free.sum())) > MOST_UNKNOWNS:
+        if (unknowns := self._free.sum()) > MOST_UNKNOWNS:
             limit = f"it is not tried beyond {MOST_UNKNOWNS}, as cvxpy would take minutes"
             raise ContactError(f"the convex program of step II has {unknowns} unknowns: {limit}")
         if self._model is None:
