@@ -61,7 +61,7 @@ def enclose_largest(
     if value is None:
         try:
             found = largest(X.middle, Y.middle)
-        except (np.linalg.LinAlgError, ValueError):  # Y not definite, not finite
+        except ValueError:  # Y not definite, not finite
             return None, None
         value, x = found.value, found.vector
     if not SMALLEST <= value <= LARGEST:

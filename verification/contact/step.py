@@ -117,9 +117,10 @@ class ContactStep:
         if self._solver != "cvxpy":
             close = lambda *hint: self._by_active_set(q, bound, start, "active-set", *hint)
             found = close() if self._steady else None
-            hint = start if found else self._nearest(q)
-            found = close(hint) if hint != start else found
-            found = found if found or self._steady else close()
+            if found is None and (hint := self._nearest(q)) != start:
+                found = close(hint)
+            if found is None and not self._steady:
+                found = close()
         if found is None and (way := way_out(self._motions, q, bound)):
             raise NoMinimiser(f"step II has no minimiser: the loads move {self._body} {way}")
         too_many = ""
@@ -164,9 +165,8 @@ class ContactStep:
         further than that from where a condition changes, as with a friction bound of 1e-13, the nodes may turn each
         other for ever, though each of the guesses meets all conditions to a share of the tolerance.
         """
-        guesses = (
-            self._certified(q, bound, guess, "active-set") for guess in self._active.repeated(q, bound, self._first)
-        )
+        repeated = self._active.repeated(q, bound, self._first)
+        guesses = (self._certified(q, bound, guess, "active-set") for guess in repeated)
         return min(filter(None, guesses), key=lambda found: found.kkt.residual, default=None)
 
     def _certified(
@@ -174,8 +174,9 @@ class ContactStep:
     ) -> ContactSolution | None:
         v, force, pattern = guess
         kkt = self._certificate.measure(q, bound, v, force)
-        solution = ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
-        return solution if kkt.residual <= TOLERANCE else None
+        if not kkt.residual <= TOLERANCE:
+            return None
+        return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
 
     def _of_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
         """Return the answer of the convex program itself, or None where it gives none; ContactError if too large."""
