@@ -184,7 +184,7 @@ class Mesh(Cells):
         apex = np.argmax(place[self.cells[around]] >= 0, axis=2)
         starts = np.take_along_axis(self.cells[around], ((apex + 1) % 3)[..., None], axis=2)[..., 0]
         spokes = (self.points[starts] - self.points[self.centres][:, None]).astype(float)
-        turn = np.argsort(np.arctan2(spokes[..., 1], spokes[..., 0]), axis=1, kind="stable")
+        turn = np.argsort(np.angle(spokes @ [1, 1j]), axis=1, kind="stable")
         return around, np.take_along_axis(starts, turn, axis=1)
 
     def split(self, names: Sequence[str]) -> Ints:

@@ -3,8 +3,8 @@
 :mod:`fem1d2d.mesh_files` runs it by its path, in isolated mode, so it imports nothing of this package.
 
 All cells become linear triangles.  A triangle of second order is cut through its middle nodes into four, a
-quadrilateral from the mean of its corners into four, by both diagonals if it is a parallelogram; one of second order is
-cut into four of first order before.
+quadrilateral by both diagonals into four, or from the mean of its corners where they cross too near its edge; one of
+second order is cut into four of first order before.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ FORMATS = {".msh": "gmsh", ".inp": "abaqus"}
 #: Linear triangles of each kind of cell, by its nodes in the order of meshio and by the points that are new, which
 #: follow them; then each new point, as weights of the nodes.
 _QUARTERS = ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))  # of a quadrilateral, its centre last
-_CENTRE = (0.25, 0.25, 0.25, 0.25)
+_BESIDE = 0.4  # the middle of a diagonal the other one crosses it at most, as a part of its length
 _SMALL = ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))  # the four in one of second order
 _SERENDIPITY = (-0.25, -0.25, -0.25, -0.25, 0.5, 0.5, 0.5, 0.5)
 
@@ -55,7 +55,7 @@ def _of_four(middle: Sequence[float] | None) -> tuple[list[list[int]], list[list
 CUTS: dict[str, tuple[Sequence[Sequence[int]], Sequence[Sequence[float]]]] = {
     "triangle": (((0, 1, 2),), ()),
     "triangle6": (((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)), ()),
-    "quad": (_QUARTERS, (_CENTRE,)),
+    "quad": (_QUARTERS, ([0.25] * 4,)),
     "quad8": _of_four(_SERENDIPITY),
     "quad9": _of_four(None),
 }
@@ -243,11 +243,22 @@ def _triangles(points: Any, blocks: dict[str, Any]) -> tuple[Any, Ints, dict[str
             number = len(points) + np.arange(made.shape[0] * made.shape[1]).reshape(made.shape[:2])
             points = np.concatenate([points, made.reshape(-1, points.shape[1])])
             cells = np.column_stack([cells, number])
+            corners = cells[:, np.array(cut)[:, 0]].reshape(-1, len(_QUARTERS))
             centres.append(number[:, -len(cut) // len(_QUARTERS) :].ravel())
+            points[centres[-1]] = _crossings(points[corners], points[centres[-1]])
         triangles.append(cells[:, np.array(cut)].reshape(-1, 3))
         parts[name] = count + np.arange(len(triangles[-1])).reshape(len(cells), len(cut))
         count += len(triangles[-1])
     return points, np.concatenate(triangles), parts, np.concatenate(centres)
+
+
+def _crossings(corners: Any, otherwise: Any) -> Any:
+    """The points at which the diagonals of quadrilaterals cross, or others where that is too near the end of one."""
+    a, b, c, d = np.swapaxes(corners[:, :, :2] @ [[1], [1j]], 0, 1)
+    with np.errstate(all="ignore"):
+        s, t = (((b - a).conj() * u).imag / ((c - a).conj() * (d - b)).imag for u in (c - a, d - b))
+    inside = np.maximum(abs(s - 0.5), abs(t - 0.5)) < _BESIDE
+    return np.where(inside, corners[:, 0] + t * (corners[:, 2] - corners[:, 0]), otherwise)
 
 
 def _by_name(pairs: Iterable[tuple[str, Ints]]) -> dict[str, Ints]:

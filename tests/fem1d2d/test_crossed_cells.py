@@ -68,7 +68,7 @@ def test_near_incompressible_cells_that_both_diagonals_split_add_little_where_on
     assert largest["both"] >= (3 - 4 * nu) * (1 - 1e-3)
 
 
-def test_cells_far_from_parallelograms_lock_unless_their_middle_lies_on_both_diagonals():
+def test_cells_far_from_parallelograms_lock_if_their_middle_is_the_mean_of_the_corners():
     """Nodes inside moved by up to a quarter of a cell; the figures of the page on mesh files."""
     flat = rectangle((0.0, 1.0), (0.0, 1.0), (8, 8), "both")
     points, (_, corners) = flat.points.copy(), flat.quadrilaterals

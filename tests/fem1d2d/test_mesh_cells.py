@@ -18,7 +18,7 @@ def grid(order):
     """Nodes of a bent grid of 3 x 2 cells with ``order`` steps along each edge, by their places."""
     s, t = np.meshgrid(np.arange(order * NX + 1), np.arange(order * NY + 1), indexing="ij")
     s, t = s / (order * NX), t / (order * NY)
-    x, y = 3 * s + 0.3 * t, 2 * t + 0.4 * s * (1 - s)
+    x, y = 3 * s + 0.3 * t, 2 * t + 0.4 * s * (1 - s) + 0.9 * s * t
     number = np.arange(s.size).reshape(s.shape)
     return np.column_stack([x.ravel(), y.ravel(), np.zeros(s.size)]), number
 
@@ -88,21 +88,62 @@ def test_every_kind_of_cell_becomes_triangles_that_fill_it(kind, tmp_path):
     assert given <= {tuple(row) for row in mesh.points.tolist()}
 
 
+def crossing(a, b, c, d):
+    """Where two diagonals meet, from two equations of two lines."""
+    s, _ = np.linalg.solve(np.column_stack([c - a, b - d])[:2], (b - a)[:2])
+    return a + s * (c - a)
+
+
 def test_quadrilaterals_are_those_that_are_cut_by_hand(tmp_path):
-    """The same points and cells, and the same stiffness to the last digit."""
+    """The same cells, points and stiffness, with the middle where the diagonals cross."""
     points, cells = gmsh(tmp_path / "body.msh", "quad")
     mesh = from_file(tmp_path / "body.msh")
-    middle = points[cells].mean(axis=1)
+    middle = np.array([crossing(*points[four]) for four in cells])
+    assert np.abs(middle - points[cells].mean(axis=1)).max() > 0.02
     number = len(points) + np.arange(len(cells))
     by_hand = [
         [a, b, m] for four, m in zip(cells, number, strict=True) for a, b in zip(four, np.roll(four, -1), strict=True)
     ]
     hand = Mesh(points=np.concatenate([points, middle])[:, :2], cells=np.array(by_hand), sides={})
     assert crossed(mesh)
-    assert mesh.points.tolist() == hand.points.tolist()
+    assert mesh.points == pytest.approx(hand.points, abs=1e-14)
     assert mesh.cells.tolist() == hand.cells.tolist()
     law = Material(lame_lambda=2.0, lame_mu=1.0)
-    assert (stiffness(mesh, law) != stiffness(hand, law)).nnz == 0
+    assert stiffness(mesh, law).toarray() == pytest.approx(stiffness(hand, law).toarray(), abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["quad", "quad8", "quad9"])
+def test_four_triangles_of_a_quadrilateral_meet_on_both_diagonals(kind, tmp_path):
+    gmsh(tmp_path / "body.msh", kind)
+    mesh = from_file(tmp_path / "body.msh")
+    for centre, corners in zip(mesh.points[mesh.centres], mesh.points[mesh.quadrilaterals[1]], strict=True):
+        for i in (0, 1):
+            u, v = corners[i] - centre, corners[i + 2] - centre
+            assert abs(u[0] * v[1] - u[1] * v[0]) < 1e-14
+            assert u @ v < 0
+
+
+@pytest.mark.parametrize(
+    ("corner", "at"),
+    [
+        ((1.0, 0.6), "crossing"),  # moved, and still far from the edges
+        ((0.53, 0.53), "mean"),  # the diagonals cross near it
+        ((0.4, 0.4), "mean"),  # concave: they cross outside
+    ],
+)
+def test_a_quadrilateral_that_is_nearly_a_triangle_or_concave_is_cut_from_the_mean_of_its_corners(corner, at, tmp_path):
+    points = np.array([[0, 0, 0], [1, 0, 0], [*corner, 0], [0, 1, 0]], dtype=float)
+    blocks = [("line", np.array([[0, 1]])), ("quad", np.array([[0, 1, 2, 3]]))]
+    tags = [np.array([1]), np.array([2])]
+    names = {"bottom": np.array([1, 1]), "body": np.array([2, 2])}
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    meshio.write(
+        tmp_path / "one.msh", meshio.Mesh(points, blocks, cell_data=data, field_data=names), "gmsh22", binary=False
+    )
+    expected = crossing(*points) if at == "crossing" else points.mean(axis=0)
+    mesh = from_file(tmp_path / "one.msh")
+    assert mesh.points[mesh.centres[0]] == pytest.approx(expected[:2], abs=1e-15)
+    assert measures(mesh.points, mesh.cells).min() > 0
 
 
 def test_the_middle_of_a_quadrilateral_without_a_node_there_is_that_of_its_shape_functions(tmp_path):
