@@ -18,6 +18,9 @@ from scipy.sparse.linalg import spilu, splu, spsolve_triangular
 
 from fem1d2d.mesh import Floats, Ints, MeshError
 
+#: A linear map of vectors: a product with a matrix, or a solver.
+Apply = Callable[[Floats], Floats]
+
 #: Why no factor of a matrix is found.
 SINGULAR = "a matrix of the body is singular in doubles: needed cells that differ less in size and shape"
 
@@ -55,7 +58,7 @@ class Response:
 
     flexibility: Floats
     loaded: Floats
-    field: Callable[[Floats], Floats]
+    field: Apply
 
 
 class Condensation:
@@ -107,7 +110,7 @@ class Condensation:
         return self._block(self.interface, self.interface)
 
     @cached_property
-    def _solve_inside(self) -> Callable[[Floats], Floats]:
+    def _solve_inside(self) -> Apply:
         order = np.searchsorted(self.inside, self.order[: len(self.inside)])
         return solver(self._block(self.inside, self.inside), order)
 
@@ -145,7 +148,7 @@ class Condensation:
         if self._shift:
             raise ValueError("the matrix is singular: needed a definite one")
 
-    def solver(self) -> Callable[[Floats], Floats]:
+    def solver(self) -> Apply:
         """``load -> A^-1 load`` on all unknowns, as :func:`solver`; a small Schur complement comes with it.
 
         The factorisation, the largest part of the memory, lives as long as the function that is returned.  ValueError
@@ -279,7 +282,7 @@ class Uncoupled(Condensation):
             schur[np.ix_(rows, rows)] = part.schur
         return symmetric(schur)
 
-    def solver(self) -> Callable[[Floats], Floats]:
+    def solver(self) -> Apply:
         """As :meth:`Condensation.solver`."""
         solvers = {part: part.solver() for part in {part for _, _, part in self._parts}}
         parts = [(own, solvers[part]) for own, _, part in self._parts]
@@ -310,7 +313,7 @@ class Lifted(Condensation):
         return self._dense[np.ix_(rows, columns)]
 
     @cached_property
-    def _solve_inside(self) -> Callable[[Floats], Floats]:
+    def _solve_inside(self) -> Apply:
         return _dense_solver(self._block(self.inside, self.inside))
 
     @cached_property
@@ -318,7 +321,7 @@ class Lifted(Condensation):
         """``A_BB + A_BI lift``, shape (b, b)."""
         return symmetric(self._on_interface + self._coupling.T @ self.lift)
 
-    def solver(self) -> Callable[[Floats], Floats]:
+    def solver(self) -> Apply:
         """As :meth:`Condensation.solver`."""
         self._needs_definite()
         return _dense_solver(self._dense)
@@ -428,7 +431,7 @@ def _by_columns(X: sp.csc_array, i: int) -> NDArray[Any]:
     return symmetric(rest)
 
 
-def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats], Floats]:
+def solver(matrix: sp.csc_array, order: Ints | None = None) -> Apply:
     """Factorise a symmetric positive definite matrix once.
 
     Parameters
@@ -452,7 +455,7 @@ def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats]
     return _solving(_factor(matrix, order), order)
 
 
-def solver_with_inertia(matrix: sp.csc_array) -> tuple[Callable[[Floats], Floats], int | None]:
+def solver_with_inertia(matrix: sp.csc_array) -> tuple[Apply, int | None]:
     """Factorise a symmetric matrix that may be indefinite, and count its negative eigenvalues.
 
     By Sylvester's law of inertia they are as many as the negative pivots.  The pivots stay on the diagonal: with
@@ -475,7 +478,7 @@ def solver_with_inertia(matrix: sp.csc_array) -> tuple[Callable[[Floats], Floats
     return _solving(factor, None), int((factor.U.diagonal() < 0).sum()) if on_diagonal else None
 
 
-def _solving(factor: Any, order: Ints | None) -> Callable[[Floats], Floats]:
+def _solving(factor: Any, order: Ints | None) -> Apply:
     rows = slice(None) if order is None else order
 
     def solve(right: Floats) -> Floats:
@@ -490,7 +493,7 @@ def _solving(factor: Any, order: Ints | None) -> Callable[[Floats], Floats]:
     return solve
 
 
-def _dense_solver(matrix: Floats) -> Callable[[Floats], Floats]:
+def _dense_solver(matrix: Floats) -> Apply:
     """``right -> matrix^-1 right``, factorised once."""
     if len(matrix) == 0:
         return lambda right: right

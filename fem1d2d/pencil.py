@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from scipy.linalg import eigh
 from scipy.linalg.lapack import dpotrf, dpotrs, dsygvx, dsygvx_lwork
 
-from fem1d2d.condense import solver
+from fem1d2d.condense import Apply, solver
 from fem1d2d.mesh import Floats, Ints
 
 #: Up to this size a pencil is solved densely.
@@ -58,15 +58,11 @@ class Eigenvalue:
     residual: float
 
 
-def rayleigh_quotient(
-    apply_A: Callable[[Floats], Floats],
-    apply_B: Callable[[Floats], Floats],
-    x: Floats,
-    solve_B: Callable[[Floats], Floats],
-) -> Eigenvalue:
-    """The Rayleigh quotient of any vector x."""
-    x = x / math.sqrt(float(x @ apply_B(x)))
-    force, mass = apply_A(x), apply_B(x)
+def rayleigh_quotient(apply_A: Apply, x: Floats, mass: Floats, solve_B: Apply) -> Eigenvalue:
+    """The Rayleigh quotient of any vector x; ``mass`` is B x."""
+    unit = math.sqrt(float(x @ mass))
+    x, mass = x / unit, mass / unit
+    force = apply_A(x)
     value = float(x @ force)
     r: Floats = force - value * mass
     x.setflags(write=False)
@@ -89,9 +85,8 @@ def largest(A: Floats, B: Floats) -> Eigenvalue:
     if failed or not count:  # LAPACK's subsets miss an eigenvalue of high multiplicity
         _, vectors = eigh(A, B, driver="gvd")
         count = n
-    return rayleigh_quotient(
-        A.__matmul__, B.__matmul__, vectors[:, count - 1], lambda r: np.asarray(dpotrs(factor, r)[0])
-    )
+    x = vectors[:, count - 1]
+    return rayleigh_quotient(A.__matmul__, x, B @ x, lambda r: np.asarray(dpotrs(factor, r)[0]))
 
 
 @lru_cache(maxsize=256)
@@ -101,12 +96,12 @@ def _work(n: int) -> int:
 
 
 def largest_of(
-    apply_A: Callable[[Floats], Floats],
-    apply_B: Callable[[Floats], Floats],
-    solve_B: Callable[[Floats], Floats],
+    apply_A: Apply,
+    apply_B: Apply,
+    solve_B: Apply,
     n: int,
     *,
-    above: tuple[float, Callable[[Floats], Floats]] | None = None,
+    above: tuple[float, Apply] | None = None,
     tolerance: float = LANCZOS,
     progress: Callable[[int], None] = lambda steps: None,
 ) -> Eigenvalue:
@@ -159,7 +154,8 @@ def largest_of(
         ritz = _lanczos(
             product, step, start, room=BASIS, kept=(0, KEPT), most=MOST, look=lambda k: k > SOON, enough=enough
         )
-        found = rayleigh_quotient(apply_A, apply_B, ritz.vectors[:, -1] @ ritz.X, solve_B)
+        x = ritz.vectors[:, -1] @ ritz.X
+        found = rayleigh_quotient(apply_A, x, apply_B(x), solve_B)
         if found.residual <= tolerance * abs(found.value):
             break
         start = apply_B(found.vector) if sigma is None else sigma * apply_B(found.vector) - apply_A(found.vector)
@@ -180,8 +176,8 @@ class Extremes:
 
 
 def extremes_by_solves(
-    apply_A: Callable[[Floats], Floats],
-    solve_B: Callable[[Floats], Floats],
+    apply_A: Apply,
+    solve_B: Apply,
     n: int,
     *,
     tolerance: float = 1e-6,
@@ -224,15 +220,8 @@ def extremes_by_solves(
     ritz = _lanczos(apply_A, solve_B, start, room=LONG_BASIS, kept=KEPT_BOTH, most=most, look=look, enough=enough)
 
     def pair(i: int) -> Eigenvalue:
-        force = ritz.vectors[:, i] @ ritz.Y
-        trace = solve_B(force)
-        unit = math.sqrt(float(trace @ force))
-        force, trace = force / unit, trace / unit
-        product = apply_A(trace)
-        value = float(trace @ product)
-        r = product - value * force
-        trace.setflags(write=False)
-        return Eigenvalue(value=value, vector=trace, residual=math.sqrt(max(float(r @ solve_B(r)), 0.0)))
+        mass = ritz.vectors[:, i] @ ritz.Y
+        return rayleigh_quotient(apply_A, solve_B(mass), mass, solve_B)
 
     return Extremes(least=pair(0), largest=pair(-1), steps=ritz.steps)
 
@@ -247,8 +236,8 @@ class _Ritz(NamedTuple):
 
 
 def _lanczos(
-    apply_A: Callable[[Floats], Floats],
-    solve_B: Callable[[Floats], Floats],
+    apply_A: Apply,
+    solve_B: Apply,
     y: Floats,
     *,
     room: int,
@@ -300,12 +289,7 @@ def _lanczos(
 
 
 def largest_sparse(
-    A: sp.csc_array,
-    B: sp.csc_array,
-    solve_B: Callable[[Floats], Floats],
-    *,
-    above: float | None = None,
-    order: Ints | None = None,
+    A: sp.csc_array, B: sp.csc_array, solve_B: Apply, *, above: float | None = None, order: Ints | None = None
 ) -> Eigenvalue:
     """Largest eigenvalue of a large pencil of sparse matrices, as :func:`largest_of`.
 

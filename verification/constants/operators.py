@@ -18,13 +18,13 @@ pivots: none lies above s, and the Lanczos iteration finds the one nearest to s.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 
 from fem1d2d import Condensation, Eigenvalue, largest_of, solver_with_inertia
+from fem1d2d.condense import Apply
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.pencil import LANCZOS
 from verification.interface import assembly
@@ -127,9 +127,7 @@ class Pencils:
         lower, upper = self._held[1]
         return (lower, upper) if neumann_body == 2 else (upper, lower)
 
-    def shifted(
-        self, shift: float, *, neumann_body: int, normal: bool = False
-    ) -> tuple[Callable[[Floats], Floats], int | None]:
+    def shifted(self, shift: float, *, neumann_body: int, normal: bool = False) -> tuple[Apply, int | None]:
         """``r -> (shift S_n - S_c)^-1 r``, and how many eigenvalues of (S_c, S_n) lie above the shift.
 
         None where the pivots do not tell how many, see :func:`fem1d2d.condense.solver_with_inertia`.

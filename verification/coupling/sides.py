@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
@@ -13,6 +12,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d import MeshError, solver_with_inertia
+from fem1d2d.condense import Apply
 from fem1d2d.mesh import Floats
 from ndtheory.keys import Part, key
 from verification.coupling.evidence import Evidence
@@ -35,8 +35,6 @@ ORDERING = "tangential components from left to right, then normal ones"
 
 #: The Neumann bodies of the roles, in their order.
 BODIES: tuple[BodyNumber, BodyNumber] = (2, 1)
-
-Apply = Callable[[Floats], Floats]
 
 
 _NO_ENTRIES: dict[str, Any] = {"null": "of an operator", "why": "an operator tells no entries", "default": None}
