@@ -117,7 +117,7 @@ class Advice(Document):
         elif not self.declared:
             of = "rho (stiffness of contact body over Neumann body on the interface, at worst)"
             least = "rho_min (at best)"
-        first += f"{of} is {_rho(best, tied)}"
+        first += f"{of} is {'estimated at ' * (best.level == 'estimated')}{_rho(best, tied)}"
         if self.neumann_body is not None:
             words = self.evidence.words(self.neumann_body)
             first += f" with {words} as Neumann {words.split()[0]}"

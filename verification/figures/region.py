@@ -42,7 +42,7 @@ def draw_region(plane: Plane) -> Figure:
         whole.set(xlim=(left, 1.3), ylim=(bottom, 2 * highest))
         enlarged.set(xlim=(0, 1), ylim=(0, ROOM * max(frictions)), xlabel=THETA)
         whole.set_title(f"{plain(plane.title)}: where one step is proved to contract")
-        enlarged.set_title("enlarged, on linear axes")
+        enlarged.set_title("enlarged, on linear axes; straight borders between computed frictions")
         legend_beside(whole)
     return figure
 

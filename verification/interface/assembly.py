@@ -265,8 +265,7 @@ def reasons_outside(interface: Interface, friction: Fraction, free: Mapping[int,
 
 
 def nearly_incompressible(bodies: list[Body]) -> str:
-    ratios = {f"{body.name}.poisson": body.poisson for body in bodies}
-    return " and ".join(f"{key} = {ratio:.12g}" for key, ratio in ratios.items() if ratio >= LOCKING)
+    return " and ".join(f"{body.name}.poisson = {body.poisson:.12g}" for body in bodies if body.poisson >= LOCKING)
 
 
 def pressure_errors(problem: Problem, bodies: list[Body]) -> Iterator[str]:
@@ -283,8 +282,7 @@ def pressure_errors(problem: Problem, bodies: list[Body]) -> Iterator[str]:
 
 def warnings_of(interface: Interface, bodies: list[Body]) -> list[str]:
     found = []
-    near = nearly_incompressible([body for body in bodies if element_of(body.mesh).locks(body.mesh)])
-    if near:
+    if near := nearly_incompressible([body for body in bodies if element_of(body.mesh).locks(body.mesh)]):
         found.append(
             f"{near}: near 1/2 linear triangles make a body too stiff and scatter the nodal pressures (Hertz on a"
             f" Delaunay mesh at {LOCKING:g}: 8 %, at 0.475: 13 %); needed a finer mesh, or"

@@ -286,7 +286,7 @@ def _rate(kit: Kit, rule: Rule) -> Finding:
         beaten = False
         for n, step in enumerate(islice(walk(rule, pair, "auto", start), 80)):
             off = norm(step.g - g)
-            if off > CONSTANT * sqrt(1 + rho) * rate**n * first + noise:
+            if not off <= CONSTANT * sqrt(1 + rho) * rate**n * first + noise:
                 raise Fails(f"after {n} steps the error is {off / first:.2g} of the first, claimed is {rate:.4g}^n")
             beaten |= off > CONSTANT * sqrt(1 + rho) * (MUTANT * rate) ** n * first + noise
             if off <= noise:

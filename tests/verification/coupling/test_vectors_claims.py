@@ -98,4 +98,5 @@ def test_the_line_to_quote_and_the_table_have_one_number_of_steps():
         found = vf.advise_vectors(*Linear(values).run("constant", 0.3, 5), kind="tied")
         steps = next(row.steps for row in found.methods if row.method == "constant" and not row.exchanged)
         assert f"about {steps} steps to 1e-6" in found.quote
+        assert "is estimated at " in found.quote
         assert "1e-9" not in found.quote
