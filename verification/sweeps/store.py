@@ -46,8 +46,9 @@ SOLVER = "auto"
 
 #: Raised by every change of a digit of a row, and only by these: 2 since a residual is compared with present forces, 3
 #: since a node that is held tangentially has no friction, and the normal between two lines is the mean of both, 4 since
-#: steps on one affine piece are taken together again, 5 since large interface matrices are condensed in another order.
-NUMERICS = 5
+#: steps on one affine piece are taken together again, 5 since large interface matrices are condensed in another
+#: order, 6 since a quadrilateral of a mesh file is cut where its diagonals cross.
+NUMERICS = 6
 
 #: Settings and arrays (name in the key: attribute) that always enter the key of a pair; a later setting enters where it
 #: differs from its default, a later array where there is one, so that keys stay.
