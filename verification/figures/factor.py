@@ -62,7 +62,8 @@ def draw_proved(found: Comparison) -> Figure:
         if rho is not None:
             predicted = [predicted_factor(theta, rho.value) for theta in thetas]
             ax.plot(thetas, predicted, "--", color="0.5", label=f"predicted, rho = {rho.value:.3g}")
-        for bound in (BOUNDS[result.name] for result in found.computed if not BOUNDS[result.name].finding):
+        proved = () if found.run.pair.outside else (BOUNDS[result.name] for result in found.computed)
+        for bound in (each for each in proved if not each.finding):
             factors = np.array(bound.curve(subject, thetas), dtype=float)  # None is not a number
             if not np.isnan(factors).all():
                 ax.plot(thetas, factors, color=bound.colour, linestyle=bound.dashes, label=bound.words)

@@ -33,7 +33,7 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
             line = history[middle] * rate.value ** (steps - middle)
             ax.semilogy(steps, line, "--", color="#D55E00", label=f"observed rate {rate.value:.4g}")
         for row in bounds:
-            if row.factor is not None and shown.any():
+            if row.factor is not None and shown.any() and not run.outside:
                 least = 1.0 if row.norm is None else row.norm.condition**-0.5
                 line = history[shown][0] / least * row.factor.value**steps
                 bound = BOUNDS[row.name]

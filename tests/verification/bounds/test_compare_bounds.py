@@ -11,6 +11,7 @@ from verification import comparison
 from verification.algorithm.rates import largest_step_ratio
 from verification.bounds.bound import NOT_ASKED
 from verification.bounds.table import chosen
+from verification.figures.factor import draw_proved
 from verification.registry import BOUNDS, PROOFS, Prover
 
 pytestmark = pytest.mark.usefixtures("known_bounds")
@@ -106,6 +107,15 @@ def test_outside_the_theorem_too_a_bound_that_was_not_asked_for_is_not_computed(
     found = vf.compare(PROBLEM.changed(law="local"), bounds=["energy"])
     assert found.verdicts["energy"].verdict == "HYPOTHESES_NOT_MET"
     assert found.verdicts["repaired"].reason == NOT_ASKED
+
+
+@pytest.mark.parametrize(("law", "drawn"), [("nonlocal", [True, True]), ("local", [False, False])])
+def test_a_figure_shows_a_bound_only_where_the_theorem_applies(law, drawn):
+    found = vf.compare(PROBLEM.changed(law=law), bounds=["energy"])
+    assert found.bounds["energy"].factor is not None
+    labels = [figure.axes[0].get_legend_handles_labels()[1] for figure in (found.plot(), draw_proved(found))]
+    assert all(labels)
+    assert [any("energy" in label for label in each) for each in labels] == drawn
 
 
 def test_names_are_those_of_the_moment(monkeypatch):
