@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: Friction values that trace the border of the region, at most.
 TRACED = 25
 
-NO_NORM = "no norm is found in which theta = {:g} contracts"
+NO_NORM = "no factor below 1 is found for theta = {:g} in a norm"
 
 _none: dict[str, Any] = {"why": lambda found: found.why, "default": None}
 
@@ -38,7 +38,7 @@ class FreeNormOfPair(Part):
 
     part: ClassVar[str] = "Bound in the free norm"
 
-    factor: Number | None = key("of one step, in the norm found", null="where no norm is found", **_none)
+    factor: Number | None = key("of one step, in the norm found", null="where none below 1 is found", **_none)
     condition: float | None = key(
         "of that norm: the largest over the least ratio of its square to that of (5.21)",
         null="where no norm is found",

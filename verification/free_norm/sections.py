@@ -56,8 +56,7 @@ def _contracts(role: LayersRole) -> str:
     if role.theta is None:
         return f"Neumann body {role.neumann}: no theta is found to contract at this friction."
     free, energy = role.lyapunov.factor, role.energy.factor
-    inside = "no norm is found in which it contracts" if free is None else f"a step contracts by {_at_most(free)}"
-    plain = "the search finds no factor"
-    if energy is not None:
-        plain = f"the factor is {_at_most(energy)}{', no contraction' * (energy.value >= 1)}"
+    none = "no factor below 1 is found"
+    inside = f"{none} in the free norm" if free is None else f"a step contracts by {_at_most(free)}"
+    plain = none if energy is None or energy.value >= 1 else f"the factor is {_at_most(energy)}"
     return f"Neumann body {role.neumann}, theta = {role.theta:g}: {inside}; in the norm (5.21) {plain}."

@@ -93,7 +93,7 @@ class Layers(Document):
     @property
     def summary(self) -> str:
         free = self.roles[0].lyapunov.factor
-        return f"two layers: {'no contraction' if free is None else f'factor {free.value:.4g} in the free norm'}"
+        return f"two layers: {'no factor is found' if free is None else f'factor {free.value:.4g} in the free norm'}"
 
 
 def two_layers(

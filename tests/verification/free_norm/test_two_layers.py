@@ -54,6 +54,11 @@ def test_no_factor_in_the_norm_of_the_paper_is_below_the_one_in_a_free_norm(nu, 
 def test_a_theta_that_rounding_loses_beside_1_has_no_factor():
     assert 1 - 1e-12 < search().factor(1e-12, 0.2) < 1
     assert search().factor(1e-16, 0.2) is None
+    found = two_layers(**SECTION_6, friction="0.2", theta="1e-16")
+    shown = layout.text(found.sections())
+    assert "theta = 1e-16: no factor below 1 is found in the free norm" in shown
+    assert found.roles[0].lyapunov.theta_max.value > 0.2  # so it contracts
+    assert not any(words in shown + found.summary for words in ("no norm", "no contraction"))
 
 
 def test_roles_exchanged_need_a_small_theta():
