@@ -64,6 +64,7 @@ _RHO_CELLS = says(
 
 MATRICES, FRICTIONLESS = "of a pair made from matrices", "without a law of friction"
 LARGE = "above 2000 contact nodes"
+DENSE, SMOOTHED = f"{MATRICES}, and {LARGE}", f"{FRICTIONLESS}, and {LARGE}"
 APART = f"{LARGE} where the bodies hold different components of them"
 KAPPA = "$k C_s C_{t1}$ and $k C_s C_{t2}$ with the largest $k$"
 NO_KAPPA = f"with friction {LARGE}, `kappa_1` also where $C_{{t1}}$ is infinite"
@@ -88,15 +89,15 @@ class Measured(Document):
         "the smaller coercivity, 0 where only contact holds the contact body", unit="stress", null=MATRICES
     )
     M: Number | None = key("the sum of the continuity constants (4.2)", unit="stress", null=MATRICES)
-    C_R: Number | None = key("lift constant", null=MATRICES)
+    C_R: Number | None = key("lift constant", null=DENSE)
     C_s: Number | None = key(
         r"of $S\sigma_N$ into $L^2(\Gamma_c)$ (5.13), of $k_jS\sigma_N/\max k$ where k varies",
         unit="stress/√length",
-        null=FRICTIONLESS,
+        null=SMOOTHED,
     )
-    C_tr: Number | None = key(r"of the tangential trace into $L^2(\Gamma_c)$ (5.13)", unit="√length", null=MATRICES)
-    C_tr_half: Number | None = key(r"the same into $H^{1/2}(\Gamma_c)$, as (5.8) prints it", null=MATRICES)
-    C_K: Number | None = key("$k C_s C_{tr}$", unit="stress", null=MATRICES)
+    C_tr: Number | None = key(r"of the tangential trace into $L^2(\Gamma_c)$ (5.13)", unit="√length", null=DENSE)
+    C_tr_half: Number | None = key(r"the same into $H^{1/2}(\Gamma_c)$, as (5.8) prints it", null=DENSE)
+    C_K: Number | None = key("$k C_s C_{tr}$", unit="stress", null=f"{MATRICES}, and with friction {LARGE}")
     rho_max: Number | None = key(
         r"$\rho$: the largest ratio of the stiffness of the contact body to the stiffness of the Neumann body",
         null=APART,
@@ -107,7 +108,7 @@ class Measured(Document):
         null=APART,
     )
     rho_normal: Number | None = key("the largest without tangential forces", null=APART)
-    C_s_energy: Number | None = key("`C_s` in energy norms", unit="√(stress/length)", null=FRICTIONLESS)
+    C_s_energy: Number | None = key("`C_s` in energy norms", unit="√(stress/length)", null=SMOOTHED)
     C_t1: Number | None = key(
         "of the tangential trace of the contact body in energy norms",
         unit="√(length/stress)",

@@ -144,6 +144,8 @@ def test_beyond_the_limit_rho_m_and_M_are_measured_and_the_rest_tells_why_not(mo
     rest = {name for name in (*NAMES, *ENERGY_NAMES) if name not in ALWAYS}
     assert {name for name in (*NAMES, *ENERGY_NAMES) if getattr(large, name) is None} == rest == set(large.reason)
     assert set(large.reason.values()) == {"41 contact nodes: dense interface matrices end at 20"}
+    said = vf.schema("constants")["properties"]
+    assert all("above 2000 contact nodes" in said[name]["description"] for name in rest)
     assert (large.nodes, large.interface_nodes) == (dense.nodes, dense.interface_nodes)
     assert pickle.loads(pickle.dumps(large)).rho_max == large.rho_max
     assert large.to_dict().keys() == dense.to_dict().keys()
