@@ -18,6 +18,7 @@ from verification.problem.readers import read_theta, takes_theta
 from verification.problem.reading import read_problem
 from verification.problem.specs import MOST_CELLS, BodySpec, ContactSpec, IterationSpec, ProblemSpec
 from verification.problem.tables import QUOTED, ProblemError
+from verification.problem.tables import plain as bare
 from verification.problem.writing import plain, toml
 
 #: A key by its tables and its name.
@@ -133,8 +134,7 @@ class Problem(ProblemSpec):
         """Return what a value of :meth:`changed` sets."""
         if name == "neumann_body" and self.several and value in (1, 2):
             return {("iteration", "neumann_bodies"): self.numbers(value)}
-        if name == "friction" and callable(value):
-            value = self._read_at_nodes(value)
+        value = self._read_at_nodes(value) if name == "friction" and callable(value) else bare(value)
         for table, cls in TABLES.items():
             if name in names(cls):
                 return {(*table, name): value}

@@ -24,6 +24,7 @@ from verification.problem.tables import (
     choice,
     integer,
     number,
+    plain,
     positive,
     several,
     show,
@@ -115,8 +116,7 @@ class SweepGrid:
 
 
 def _read(values: Any, read: Callable[[Any], Any], refuse: Callable[[Any, str], ProblemError]) -> tuple[Any, ...]:
-    if hasattr(values, "tolist"):  # an array
-        values = values.tolist()
+    values = plain(values)
     if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, (Sequence, range)):
         raise refuse(values, "needed a list of values")
     if not values:

@@ -16,6 +16,7 @@ from strategies import fewer
 import verification as vf
 from verification.interface.friction import Local
 from verification.registry import LAWS
+from verification.sweeps.grid import SweepGrid
 
 PLANE = vf.example("section6")
 BARS = vf.example("two-bars")
@@ -26,6 +27,15 @@ RIGID = vf.Problem.from_dict(
         "contact": {"friction": "0.2", "law": "local"},
     }
 )
+
+
+def test_arrays_of_numpy_are_values_for_both_bodies():
+    given = {"young": np.array([70000.0, 20000.0]), "cells": np.array([[10, 2], [6, 2]]), "friction": np.float64(0.25)}
+    plain = {name: value.tolist() for name, value in given.items()}
+    assert PLANE.changed(**given) == PLANE.changed(**plain)
+    axes = {"young": [given["young"]], "refine": np.array([0, 1]), "neumann_body": [np.int64(1)], "theta": (0.5,)}
+    plain = {"young": [plain["young"]], "refine": [0, 1], "neumann_body": [1], "theta": [0.5]}
+    assert SweepGrid.of(axes) == SweepGrid.of(plain)
 
 
 def put(problem, key, value):
