@@ -35,7 +35,7 @@ FORMATS = {".msh": "gmsh", ".inp": "abaqus"}
 #: Linear triangles of each kind of cell, by its nodes in the order of meshio and by the points that are new, which
 #: follow them; then each new point, as weights of the nodes.
 _QUARTERS = ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))  # of a quadrilateral, its centre last
-_BESIDE = 0.4  # the middle of a diagonal the other one crosses it at most, as a part of its length
+_BESIDE = 0.4  # at most, as a part of a diagonal, from its middle to the crossing: further out triangles are slivers
 _SMALL = ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))  # the four in one of second order
 _SERENDIPITY = (-0.25, -0.25, -0.25, -0.25, 0.5, 0.5, 0.5, 0.5)
 
@@ -243,7 +243,7 @@ def _triangles(points: Any, blocks: dict[str, Any]) -> tuple[Any, Ints, dict[str
             number = len(points) + np.arange(made.shape[0] * made.shape[1]).reshape(made.shape[:2])
             points = np.concatenate([points, made.reshape(-1, points.shape[1])])
             cells = np.column_stack([cells, number])
-            corners = cells[:, np.array(cut)[:, 0]].reshape(-1, len(_QUARTERS))
+            corners = cells[:, np.array(cut)[:, 0]].reshape(-1, 4)
             centres.append(number[:, -len(cut) // len(_QUARTERS) :].ravel())
             points[centres[-1]] = _crossings(points[corners], points[centres[-1]])
         triangles.append(cells[:, np.array(cut)].reshape(-1, 3))

@@ -11,7 +11,7 @@ BESIDE = {tokenize.COMMENT, tokenize.NL}
 LAYOUT = {tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 #: Lines and tokens of code of the three packages together at most; comments, docstrings and layout are no tokens.
-LINES, TOKENS = 59_197, 434_661
+LINES, TOKENS = 59_199, 434_698
 
 #: Lines of each package at most, those of packages inside it apart: a tenth more than it has.
 BUDGET = {
