@@ -196,9 +196,9 @@ def assert_momentum(pair: ContactPair, rho: float, solution: np.ndarray, start: 
 
 
 def solution_of(pair: ContactPair) -> np.ndarray:
-    """The fixed point without friction, to rounding."""
-    for relaxation in ("newton", "constant"):
-        done = run(with_rule(pair, relaxation, tolerance=1e-14, max_iterations=2000), theta="auto")
+    """The fixed point without friction, whose error is at most the residual: a tenth of what is allowed below."""
+    for relaxation in ("newton", "constant"):  # where rho is 500, rounding leaves residuals of 1e-13
+        done = run(with_rule(pair, relaxation, tolerance=1e-12, max_iterations=2000), theta="auto")
         if done.outcome in ("converged", "stalled"):
             return done.last.image
     raise AssertionError("no solution")
