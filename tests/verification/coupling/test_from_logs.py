@@ -412,6 +412,14 @@ def test_a_plateau_bounds_rho_by_its_upper_end():
     assert {one.value for one in from_logs.bounds([seen])[0]} == {F(3), F(8)}
 
 
+def test_the_least_bound_from_above_is_that_of_the_interval_and_the_one_that_contradicts():
+    above = [bound(2, "b.log"), bound(7)]
+    assert from_logs.interval_of([], above).hi.value == 2
+    refused = from_logs.interval_of([bound(5, "c.log")], above)
+    assert refused.hi.value == 2
+    assert "by b.log with theta = 0.5 rho is at most 2, by c.log with theta = 0.5 at least 5" in refused.contradiction
+
+
 def test_a_log_too_short_to_be_read_falls_and_is_swift_where_each_window_is():
     of = lambda *heights, steps=2: log("0.3", paces=[Pace(kind="short", steps=steps, height=each) for each in heights])
     assert of(0.09, 0.01).falls
