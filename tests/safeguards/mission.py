@@ -69,11 +69,7 @@ MISSION: dict[str, tuple[str, ...]] = {
 #: Drawn mutants by module, each with the reason why no test can notice it.
 EQUIVALENT: dict[str, dict[str, str]] = {
     "fem1d2d/assembly.py": {"assemble: max -> min": "numbers of nodes have 32 bits up to 2^31 entries of all cells"},
-    "fem1d2d/condense.py": {"Condensation._shifted: 0 -> 1": "the matrix is square"},
-    "fem1d2d/line.py": {
-        "_directions: 1 - SAME ** 2 / 2 -> 1 + SAME ** 2 / 2": "as doubles both are 1",
-        "_directions: 2 -> 3": "1 - SAME**2 / 2 is 1 as a double, with the cube too",
-    },
+    "fem1d2d/line.py": {"_directions: 2 -> 3": "1 - SAME**2 / 2 is 1 as a double, with the cube too"},
     "ndtheory/energy_norms.py": {"_roots: 0 -> 1": "a root that does not exist may have any value"},
     "verification/algorithm/affine_piece.py": {
         "Piece.changes: self.sign.any() and kernel is not None -> self.sign.any()": "signs are of a kernel's stress"
